@@ -1,0 +1,136 @@
+/// Fixed-point arithmetic: explicit formats, saturation, unbiased rounding. Integers only.
+///
+/// Notation: Q(m.n) is a two's complement number with n fraction bits. Every operation either is exact,
+/// rounds half to even (so repeated rounding adds no bias), or saturates at the end of the format. Nothing
+/// wraps.
+#pragma once
+
+#include <compare>
+#include <concepts>
+#include <cstdint>
+#include <limits>
+
+namespace dsp {
+
+/// Clamps to the range of int32. Exact inside it.
+constexpr std::int32_t saturate32(std::int64_t v) {
+    constexpr std::int64_t kMax = std::numeric_limits<std::int32_t>::max();
+    constexpr std::int64_t kMin = std::numeric_limits<std::int32_t>::min();
+    return static_cast<std::int32_t>(v > kMax ? kMax : (v < kMin ? kMin : v));
+}
+
+/// Clamps to the range of int16. Exact inside it.
+constexpr std::int16_t saturate16(std::int32_t v) {
+    constexpr std::int32_t kMax = std::numeric_limits<std::int16_t>::max();
+    constexpr std::int32_t kMin = std::numeric_limits<std::int16_t>::min();
+    return static_cast<std::int16_t>(v > kMax ? kMax : (v < kMin ? kMin : v));
+}
+
+/// v / 2^bits, rounded half to even; 0 <= bits < width of Int. Exact for bits = 0. Cannot overflow: the
+/// rounding bit is added after the shift.
+template <std::signed_integral Int>
+constexpr Int round_shift(Int v, int bits) {
+    if (bits == 0) return v;
+    const Int floor = v >> bits;
+    const Int half = Int{1} << (bits - 1);
+    const Int rest = v & static_cast<Int>((half - 1) | half);
+    const bool up = rest > half || (rest == half && (floor & 1) != 0);
+    return static_cast<Int>(floor + (up ? 1 : 0));
+}
+
+/// num / den rounded half to even, den > 0. The quotient must fit Int.
+template <std::signed_integral Int>
+constexpr Int round_divide(Int num, Int den) {
+    Int q = num / den;
+    Int r = num % den;
+    if (r < 0) {
+        r = static_cast<Int>(r + den);
+        --q;
+    }
+    const Int rest = static_cast<Int>(den - r);
+    if (r > rest || (r == rest && (q & 1) != 0)) ++q;
+    return q;
+}
+
+/// A saturating fixed-point number with FractionBits fraction bits in 32 bits: Q(31-F.F).
+///
+/// Range [-2^(31-F), 2^(31-F) - 2^-F]. Sums and differences are exact or saturate; products round half to
+/// even and saturate; a quotient by zero saturates to the end of the range with the sign of the dividend (0/0
+/// = 0).
+template <int FractionBits>
+class Fixed {
+    static_assert(FractionBits > 0 && FractionBits < 31);
+
+  public:
+    static constexpr int fraction_bits = FractionBits;
+
+    constexpr Fixed() = default;
+    /// An integer, saturated to the range. Implicit, so that `x * 2` and Eigen's literal 0 and 1 work.
+    constexpr Fixed(int v) : raw_(saturate32(static_cast<std::int64_t>(v) << FractionBits)) {}  // NOLINT
+
+    static constexpr Fixed from_raw(std::int32_t raw) {
+        Fixed f;
+        f.raw_ = raw;
+        return f;
+    }
+    /// num/den rounded half to even, saturated: the way to write a constant, `ratio(1, 10)` for 0.1.
+    static constexpr Fixed ratio(std::int64_t num, std::int64_t den) {
+        if (den < 0) return ratio(-num, -den);
+        return from_raw(saturate32(round_divide<std::int64_t>(num * (std::int64_t{1} << FractionBits), den)));
+    }
+    static constexpr Fixed max() { return from_raw(std::numeric_limits<std::int32_t>::max()); }
+    static constexpr Fixed min() { return from_raw(std::numeric_limits<std::int32_t>::min()); }
+
+    [[nodiscard]] constexpr std::int32_t raw() const { return raw_; }
+
+    /// The same value with another number of fraction bits: rounds half to even, saturates.
+    template <int G>
+    [[nodiscard]] constexpr Fixed<G> to() const {
+        if constexpr (G >= FractionBits) {
+            return Fixed<G>::from_raw(saturate32(static_cast<std::int64_t>(raw_) << (G - FractionBits)));
+        } else {
+            return Fixed<G>::from_raw(round_shift(raw_, FractionBits - G));
+        }
+    }
+    /// value * scale rounded half to even: for signals in integer units, e.g. `in_units(1000)` for mm of
+    /// metres.
+    [[nodiscard]] constexpr std::int32_t in_units(std::int32_t scale) const {
+        return saturate32(round_shift(static_cast<std::int64_t>(raw_) * scale, FractionBits));
+    }
+
+    constexpr auto operator<=>(const Fixed&) const = default;
+
+    constexpr Fixed operator-() const { return from_raw(saturate32(-static_cast<std::int64_t>(raw_))); }
+    friend constexpr Fixed operator+(Fixed a, Fixed b) {
+        return from_raw(saturate32(static_cast<std::int64_t>(a.raw_) + b.raw_));
+    }
+    friend constexpr Fixed operator-(Fixed a, Fixed b) {
+        return from_raw(saturate32(static_cast<std::int64_t>(a.raw_) - b.raw_));
+    }
+    friend constexpr Fixed operator*(Fixed a, Fixed b) {
+        return from_raw(saturate32(round_shift(static_cast<std::int64_t>(a.raw_) * b.raw_, FractionBits)));
+    }
+    friend constexpr Fixed operator/(Fixed a, Fixed b) {
+        if (b.raw_ == 0) return a.raw_ > 0 ? max() : (a.raw_ < 0 ? min() : Fixed{});
+        std::int64_t num = static_cast<std::int64_t>(a.raw_) * (std::int64_t{1} << FractionBits);
+        std::int64_t den = b.raw_;
+        if (den < 0) {
+            num = -num;
+            den = -den;
+        }
+        return from_raw(saturate32(round_divide(num, den)));
+    }
+    constexpr Fixed& operator+=(Fixed o) { return *this = *this + o; }
+    constexpr Fixed& operator-=(Fixed o) { return *this = *this - o; }
+    constexpr Fixed& operator*=(Fixed o) { return *this = *this * o; }
+    constexpr Fixed& operator/=(Fixed o) { return *this = *this / o; }
+
+  private:
+    std::int32_t raw_ = 0;
+};
+
+/// The format of physical quantities between the rooms (metres, metres per second, their variances, decibels,
+/// probabilities): Q9.22, range +-512, step 2.4e-7.
+using Real = Fixed<22>;
+
+}  // namespace dsp
