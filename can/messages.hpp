@@ -1,5 +1,6 @@
-/// What the radar says and hears on the bus, in integer engineering units. `can/codec.hpp` turns these into
-/// frames, `can/radar.dbc` describes the same frames to the rest of the world.
+/// What the radar says and hears on the bus, in integer engineering units. Nothing here depends on how fast
+/// the processor is: the same beat frames give the same bytes on every platform. `can/codec.hpp` turns these
+/// into frames, `can/radar.dbc` describes the same frames to the rest of the world.
 #pragma once
 
 #include <array>
@@ -34,8 +35,7 @@ struct Status {  ///< 0x400, every cycle
     std::uint16_t faults = 0;  ///< bits of Fault
     std::uint8_t cycle = 0;    ///< frame counter modulo 256, equal in every message of one cycle
     std::uint8_t detections = 0;
-    std::uint8_t load_percent = 0;  ///< processing time over the period; 0 on a virtual clock
-    std::uint8_t overruns = 0;      ///< modulo 256
+    std::uint8_t overruns = 0;  ///< modulo 256
 };
 
 struct Version {  ///< 0x401, once a second
@@ -82,9 +82,8 @@ struct CommandEcho {  ///< 0x403, in answer to each command
 struct ObjectListHeader {    ///< 0x410, every cycle, before its objects
     std::uint8_t count = 0;  ///< 0..16 objects follow
     std::uint8_t cycle = 0;
-    bool valid = false;        ///< false: the list is not a statement about the road
-    bool overflow = false;     ///< more confirmed tracks than fit
-    std::uint16_t age_ms = 0;  ///< from the middle of the beat frame to this message
+    bool valid = false;     ///< false: the list is not a statement about the road
+    bool overflow = false;  ///< more confirmed tracks than fit
 };
 
 enum class Motion : std::uint8_t { unknown = 0, stationary = 1, moving = 2, oncoming = 3, stopped = 4 };
