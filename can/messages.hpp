@@ -50,7 +50,7 @@ struct CollisionWarning {  ///< 0x402, every cycle
     bool valid = false;    ///< false: no statement is possible (faults); level and values mean nothing
     WarningLevel level = WarningLevel::none;
     std::uint8_t track_id = 0;  ///< 0: none
-    std::optional<std::int32_t> time_to_collision_ms;
+    std::optional<std::int32_t> time_to_collision_ms = std::nullopt;
     std::int32_t required_deceleration_mmps2 = 0;
     std::uint8_t cycle = 0;
 };
