@@ -1,0 +1,47 @@
+/// Cells over threshold to detections: one per target, in metres and metres per second, with variances.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "dsp/detection.hpp"
+#include "dsp/os_cfar.hpp"
+#include "dsp/range_doppler.hpp"
+#include "dsp/waveform.hpp"
+#include "dsp/window.hpp"
+
+namespace dsp {
+
+struct PeakConfig {
+    std::int16_t min_snr_cdb = 0;  ///< detections below it are discarded, hundredths of a decibel, 0..4000
+    /// A maximum is a sidelobe of a stronger one unless it exceeds the window's sidelobes by this much,
+    /// hundredths of a decibel, 0..2000. Higher: fewer ghosts of fluctuating or moving targets, but weak
+    /// targets beside strong ones are lost.
+    std::int16_t sidelobe_margin_cdb = 500;
+    /// Nothing weaker than the strongest cell of the map minus this is believed, hundredths of a decibel,
+    /// 3000..9000.
+    std::int16_t dynamic_range_cdb = 7500;
+
+    constexpr bool operator==(const PeakConfig&) const = default;
+    [[nodiscard]] constexpr bool valid() const {
+        return min_snr_cdb >= 0 && min_snr_cdb <= 4000 && sidelobe_margin_cdb >= 0 &&
+               sidelobe_margin_cdb <= 2000 && dynamic_range_cdb >= 3000 && dynamic_range_cdb <= 9000;
+    }
+};
+static_assert(PeakConfig{}.valid());
+
+/// Local maxima over threshold that are examined for sidelobes; the weakest of more than these count as
+/// dropped.
+inline constexpr int kMaxCandidates = 128;
+
+/// A local maximum, ordered by power, then by place, so that the order of equals is defined.
+/// Bits 31..16 log-power, 10..6 range cell, 5..0 Doppler cell.
+using Candidate = std::uint32_t;
+using CandidateList = std::array<Candidate, kMaxCandidates>;
+
+/// Replaces `detections`. `peaks`: local maxima over threshold.
+void extract_peaks(const PowerMap& map, const CellMask& peaks, const OsCfar& cfar, WindowKind range_window,
+                   WindowKind doppler_window, const PeakConfig& config, const CellScale& scale,
+                   CandidateList& scratch, DetectionList& detections);
+
+}  // namespace dsp
