@@ -2,9 +2,10 @@
 /// column.
 ///
 /// Gating fills rows (which measurements, and the logarithm of each likelihood ratio); a solver (NN, PDA,
-/// JPDA, ...) turns the ratios of all rows into probabilities; the order-statistics decision logic may then
-/// reshape them. Every step works on `std::span<AssociationRow<S>>`, so steps combine freely and no step
-/// knows how many tracks there are.
+/// JPDA, ...) turns the ratios of all rows into probabilities, beta and missed, and copies them to the
+/// weights; the order-statistics decision logic may then reshape the weights. The filter moves the estimate
+/// by the weights and widens the covariance by the probabilities. Every step works on
+/// `std::span<AssociationRow<S>>`, so steps combine freely and no step knows how many tracks there are.
 #pragma once
 
 #include <array>
@@ -24,6 +25,7 @@ struct Candidate {
     std::uint16_t measurement = 0;  ///< index into the frame's measurements
     S log_ratio = S(0);             ///< ln( PD N(nu; 0, S) / lambda ): target against clutter
     S beta = S(0);                  ///< probability that this measurement is the track's
+    S weight = S(0);  ///< its share in the new estimate: beta, or what a decision logic made of it
 };
 
 template <class S>
@@ -32,7 +34,10 @@ struct AssociationRow {
     int count = 0;
     int dropped = 0;      ///< gated measurements that did not fit
     S log_missed = S(0);  ///< ln(1 - PD PG)
-    S missed = S(0);      ///< beta_0: probability that none is
+    S log_evidence =
+        S(0);         ///< ln(1 - PD PG + sum of ratios): for the track against its absence; set by pda()
+    S missed = S(1);  ///< beta_0: probability that none is
+    S missed_weight = S(1);  ///< share of the prediction in the new estimate
 
     [[nodiscard]] std::span<Candidate<S>> candidates() {
         return {item.data(), static_cast<std::size_t>(count)};

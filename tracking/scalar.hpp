@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstdint>
 
+#include "dsp/fixed_math.hpp"
 #include "dsp/fixed_point.hpp"
 
 namespace tracking {
@@ -27,6 +28,58 @@ constexpr S scalar_from(dsp::Fixed<F> v) {
         return static_cast<S>(v.raw()) / static_cast<S>(std::int64_t{1} << F);
     } else {
         return v.template to<S::fraction_bits>();
+    }
+}
+
+/// e^x, natural logarithm and square root of either scalar. The fixed-point ones saturate, see
+/// dsp/fixed_math.hpp.
+template <class S>
+constexpr S exp(S x) {
+    if constexpr (std::floating_point<S>) {
+        return std::exp(x);
+    } else {
+        return dsp::exp(x);
+    }
+}
+template <class S>
+constexpr S ln(S x) {
+    if constexpr (std::floating_point<S>) {
+        return std::log(x);
+    } else {
+        return dsp::ln(x);
+    }
+}
+template <class S>
+constexpr S sqrt(S x) {
+    if constexpr (std::floating_point<S>) {
+        return std::sqrt(x);
+    } else {
+        return dsp::sqrt(x);
+    }
+}
+
+/// Something to multiply with instead of dividing by d: cheap when several numbers have the same divisor.
+template <class S>
+constexpr auto reciprocal(S d) {
+    if constexpr (std::floating_point<S>) {
+        return S(1) / d;
+    } else {
+        return dsp::Reciprocal(d);
+    }
+}
+
+template <class S>
+constexpr S absolute(S x) {
+    return x < S(0) ? -x : x;
+}
+
+/// Not a number or infinite; a fixed-point number never is.
+template <class S>
+constexpr bool is_finite(S x) {
+    if constexpr (std::floating_point<S>) {
+        return std::isfinite(x);
+    } else {
+        return true;
     }
 }
 

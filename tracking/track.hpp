@@ -28,11 +28,13 @@ struct Track {
     TrackState state = TrackState::free;
     Vec2<S> x = Vec2<S>::Zero();
     Mat2<S> covariance = Mat2<S>::Identity();
-    S existence = S(0);       ///< 0..1
-    S snr_db = S(0);          ///< smoothed, of the measurements that updated it
-    std::uint16_t age = 0;    ///< frames since its first measurement, saturating
-    std::uint8_t misses = 0;  ///< frames in a row without a measurement in the gate
-    bool measured = false;    ///< a measurement was in the gate in this frame
+    S existence = S(0);        ///< 0..1
+    S snr_db = S(0);           ///< smoothed, of the measurements that updated it
+    std::uint16_t age = 0;     ///< frames since its first measurement, saturating
+    std::uint8_t hits = 0;     ///< frames in which it was measured, saturating
+    std::uint8_t misses = 0;   ///< frames in a row in which it was not, saturating
+    std::uint8_t overlap = 0;  ///< frames in a row in which it could not be told from an older track
+    bool measured = false;  ///< took a measurement in this frame: the prediction's weight was below one half
 
     [[nodiscard]] bool is_confirmed() const {
         return state == TrackState::confirmed || state == TrackState::coasting;

@@ -1,0 +1,142 @@
+/// Which measurements can be a track's, and how much likelier each is the target than clutter.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "tracking/association.hpp"
+#include "tracking/kalman.hpp"
+#include "tracking/scalar.hpp"
+#include "tracking/track.hpp"
+
+namespace tracking {
+
+template <class S>
+struct GateConfig {
+    S gate =
+        S(16);  ///< g^2: largest nu' S^-1 nu. 16 is 4 sigma, PG = 0.99966; smaller loses manoeuvring tracks
+    S detection_probability = constant<S>(9, 10);  ///< PD of a target in the field of view
+    /// PD of a target so near another that the two echoes may be one detection: a miss says little.
+    S obscured_detection_probability = constant<S>(3, 10);
+    /// lambda, false detections a frame per m (m/s); below 2^-22 it is taken as 2^-22. Larger than thermal
+    /// false alarms alone (about 2e-5) so that one doubtful detection does not outweigh everything known.
+    S clutter_density = constant<S>(5, 10'000);
+    /// Range rates are measured modulo this (wavelength / 2 chirp intervals); 0: unambiguous.
+    S rate_span_mps = constant<S>(60'834'496, 1'000'000);
+    /// Range error per span of range rate that was folded: coupling_s * rate_span_mps, because the signal
+    /// processing removes the range-Doppler coupling of the folded rate.
+    S alias_range_m = constant<S>(4'996'541, 1'000'000);
+
+    [[nodiscard]] constexpr bool valid() const {
+        return gate > S(0) && gate <= S(100) && detection_probability > S(0) &&
+               detection_probability <= S(1) && obscured_detection_probability >= S(0) &&
+               obscured_detection_probability <= detection_probability && clutter_density >= S(0) &&
+               clutter_density <= S(1) && rate_span_mps >= S(0) && rate_span_mps <= S(400) &&
+               absolute(alias_range_m) <= S(100);
+    }
+};
+
+/// Fills association rows. Each candidate has its own S = P + R, since measurements differ in accuracy.
+template <class S>
+class Gate {
+  public:
+    explicit Gate(const GateConfig<S>& config)
+        : config_(config),
+          gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
+          seen_(logs(config.detection_probability)),
+          obscured_(logs(config.obscured_detection_probability)) {}
+
+    /// nu = z - x, with the range rate unfolded to the ambiguity nearest to x and the range shifted with it.
+    [[nodiscard]] Vec2<S> innovation(const Vec2<S>& x, const Vec2<S>& z) const {
+        Vec2<S> nu(z[0] - x[0], z[1] - x[1]);
+        const S half = config_.rate_span_mps * constant<S>(1, 2);
+        if (half <= S(0)) return nu;
+        for (int k = 0; k < kMaxFolds && nu[1] > half; ++k) {
+            nu[0] += config_.alias_range_m;
+            nu[1] -= config_.rate_span_mps;
+        }
+        for (int k = 0; k < kMaxFolds && nu[1] < -half; ++k) {
+            nu[0] -= config_.alias_range_m;
+            nu[1] += config_.rate_span_mps;
+        }
+        return nu;
+    }
+
+    /// ln of the likelihood ratio PD N(nu; 0, S) / lambda of a measurement inside the gate; nothing outside,
+    /// or when S is singular.
+    [[nodiscard]] bool test(const Vec2<S>& nu, const Mat2<S>& p, const Vec2<S>& r, S& distance2,
+                            S& log_density) const {
+        const Mat2<S> s = innovation_covariance(p, r);
+        // Each coordinate alone, without a division: rejects nearly all.
+        if (nu[0] * nu[0] > config_.gate * s(0, 0) || nu[1] * nu[1] > config_.gate * s(1, 1)) return false;
+        const Ldl<S> factors(s);
+        if (!factors.valid()) return false;
+        distance2 = factors.distance2(nu);
+        if (distance2 > config_.gate) return false;
+        log_density = factors.log_density(distance2);
+        return true;
+    }
+
+    /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`. Of more
+    /// than kMaxGated the likeliest are kept. Betas are left to a solver.
+    void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
+              std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured) const {
+        const Logs& logs = obscured ? obscured_ : seen_;
+        row.count = 0;
+        row.dropped = 0;
+        row.log_missed = logs.missed;
+        for (std::uint64_t rest = usable; rest != 0; rest &= rest - 1) {
+            const auto index = static_cast<std::size_t>(std::countr_zero(rest));
+            if (index >= measurements.size()) break;
+            const Measurement<S>& m = measurements[index];
+            S distance2(0);
+            S log_density(0);
+            if (!test(innovation(x, m.z), p, m.variance, distance2, log_density)) continue;
+            insert(row, {static_cast<std::uint16_t>(index), logs.detected + log_density, S(0), S(0)});
+        }
+    }
+
+    [[nodiscard]] const GateConfig<S>& config() const { return config_; }
+
+  private:
+    static constexpr int kMaxFolds = 3;
+
+    struct Logs {
+        S detected;  // ln(PD / lambda)
+        S missed;    // ln(1 - PD PG)
+    };
+
+    /// ln of a number of at least 2^-22: a certainty stays finite, so that comparing certainties works.
+    static S floored_ln(S v) {
+        const S least = constant<S>(1, std::int64_t{1} << 22);
+        return ln(v < least ? least : v);
+    }
+    [[nodiscard]] Logs logs(S detection_probability) const {
+        return {floored_ln(detection_probability) - floored_ln(config_.clutter_density),
+                floored_ln(S(1) - detection_probability * gate_probability_)};
+    }
+
+    static void insert(AssociationRow<S>& row, const Candidate<S>& candidate) {
+        if (row.count < kMaxGated) {
+            row.item[static_cast<std::size_t>(row.count++)] = candidate;
+            return;
+        }
+        ++row.dropped;
+        std::size_t weakest = 0;
+        for (std::size_t i = 1; i < kMaxGated; ++i) {
+            if (row.item[i].log_ratio < row.item[weakest].log_ratio) weakest = i;
+        }
+        if (candidate.log_ratio <= row.item[weakest].log_ratio) return;
+        for (std::size_t i = weakest; i + 1 < kMaxGated; ++i) row.item[i] = row.item[i + 1];
+        row.item[kMaxGated - 1] = candidate;
+    }
+
+    GateConfig<S> config_;
+    S gate_probability_;
+    Logs seen_;
+    Logs obscured_;
+};
+
+}  // namespace tracking

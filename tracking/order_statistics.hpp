@@ -1,0 +1,261 @@
+/// Order-statistics decision logic (Lee and Kim 2000): the association rows of any solver, reshaped so that
+/// each track prefers one measurement and neighbouring tracks do not share it. OSPDA is this over pda(),
+/// OSJPDA is this over JPDA.
+///
+/// As printed: in track order, the dominant measurement of a track is its largest beta among the measurements
+/// not yet dominant for an earlier track; every other beta of the row is divided by alpha; rows are
+/// normalised. What the paper leaves open, or what turned out to matter, is a named option here.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "tracking/association.hpp"
+#include "tracking/scalar.hpp"
+#include "tracking/track.hpp"
+
+namespace tracking {
+
+/// Who chooses a dominant measurement first.
+enum class Precedence : std::uint8_t {
+    index,     ///< track order, as printed
+    strength,  ///< the largest beta of all, then the largest of those left, ...
+    optimal,   ///< all at once: the one-to-one assignment with the largest product of likelihood ratios
+};
+/// What becomes of beta_0.
+enum class MissedColumn : std::uint8_t {
+    drop,  ///< as printed: a track with a measurement in its gate is always moved
+    keep,
+};
+/// Which betas are made smaller.
+enum class Reduced : std::uint8_t {
+    all_but_dominant,   ///< as printed
+    claimed_by_others,  ///< only measurements that are dominant for another track
+};
+enum class Reduction : std::uint8_t {
+    divide,  ///< by alpha, as printed
+    soft,    ///< times 1 - beta of the track that claims it; where nobody claims it, unchanged
+};
+/// Which probabilities the covariance is computed with.
+enum class CovarianceBetas : std::uint8_t { reshaped, original };
+
+template <class S>
+struct OrderStatisticsConfig {
+    S alpha = S(4);  ///< > 1; 4 over PDA, 6 over JPDA in the paper. Not used by Reduction::soft
+    Precedence precedence = Precedence::optimal;
+    MissedColumn missed = MissedColumn::keep;
+    Reduced reduced = Reduced::claimed_by_others;
+    Reduction reduction = Reduction::soft;
+    CovarianceBetas covariance = CovarianceBetas::original;
+
+    [[nodiscard]] constexpr bool valid() const { return alpha > S(1) && alpha <= S(100); }
+};
+
+/// The literal reading of the paper.
+template <class S>
+inline constexpr OrderStatisticsConfig<S> kLeeKim2000{S(4),
+                                                      Precedence::index,
+                                                      MissedColumn::drop,
+                                                      Reduced::all_but_dominant,
+                                                      Reduction::divide,
+                                                      CovarianceBetas::reshaped};
+
+namespace detail {
+
+inline constexpr int kNobody = -1;
+
+/// For each row the candidate that dominates it, or kNobody; for each measurement the row it dominates.
+struct Dominants {
+    std::array<int, kMaxTracks> candidate;
+    std::array<std::int8_t, kMaxMeasurements> owner;
+
+    Dominants() {
+        candidate.fill(kNobody);
+        owner.fill(kNobody);
+    }
+    template <class S>
+    void claim(std::size_t row, int item, const AssociationRow<S>& r) {
+        candidate[row] = item;
+        owner[r.item[static_cast<std::size_t>(item)].measurement] = static_cast<std::int8_t>(row);
+    }
+};
+
+/// Largest beta among the row's measurements nobody owns; kNobody when there is none.
+template <class S>
+int largest_free(const AssociationRow<S>& row, const Dominants& dominants) {
+    int best = kNobody;
+    for (int i = 0; i < row.count; ++i) {
+        const Candidate<S>& c = row.item[static_cast<std::size_t>(i)];
+        if (dominants.owner[c.measurement] != kNobody) continue;
+        if (best == kNobody || c.beta > row.item[static_cast<std::size_t>(best)].beta) best = i;
+    }
+    return best;
+}
+
+template <class S>
+void choose_by_index(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
+    for (std::size_t t = 0; t < rows.size(); ++t) {
+        const int item = largest_free(rows[t], dominants);
+        if (item != kNobody) dominants.claim(t, item, rows[t]);
+    }
+}
+
+template <class S>
+void choose_by_strength(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
+    for (std::size_t round = 0; round < rows.size(); ++round) {
+        std::size_t strongest = rows.size();
+        int strongest_item = kNobody;
+        S largest(0);
+        for (std::size_t t = 0; t < rows.size(); ++t) {
+            if (dominants.candidate[t] != kNobody) continue;
+            const int item = largest_free(rows[t], dominants);
+            if (item == kNobody) continue;
+            const S beta = rows[t].item[static_cast<std::size_t>(item)].beta;
+            if (strongest_item == kNobody || beta > largest) {
+                strongest = t;
+                strongest_item = item;
+                largest = beta;
+            }
+        }
+        if (strongest_item == kNobody) return;
+        dominants.claim(strongest, strongest_item, rows[strongest]);
+    }
+}
+
+/// Shortest augmenting paths (Jonker and Volgenant 1987) over the measurements and one private "missed"
+/// column a row. Cost of a candidate: ln of the row's missed term minus ln of its ratio. At most rows^2
+/// (measurements + rows) steps.
+template <class S>
+void choose_optimally(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
+    constexpr int kColumns = kMaxMeasurements + kMaxTracks;
+    std::array<S, kMaxTracks> row_price{};
+    std::array<S, kColumns> column_price{};
+    std::array<std::int8_t, kColumns> row_of;
+    row_of.fill(kNobody);
+
+    for (std::size_t start = 0; start < rows.size(); ++start) {
+        std::array<S, kColumns> distance;
+        std::array<std::int8_t, kColumns> previous;  // column before, kNobody: the starting row
+        std::array<bool, kColumns> reached{};
+        std::array<bool, kColumns> done{};
+        previous.fill(kNobody);
+        std::size_t row = start;
+        int from = kNobody;
+        S travelled(0);
+        int last = kNobody;
+        for (std::size_t step = 0; step <= rows.size(); ++step) {
+            const auto relax = [&](int column, S cost) {
+                const auto c = static_cast<std::size_t>(column);
+                if (done[c]) return;
+                const S d = travelled + cost - row_price[row] - column_price[c];
+                if (reached[c] && d >= distance[c]) return;
+                reached[c] = true;
+                distance[c] = d;
+                previous[c] = static_cast<std::int8_t>(from);
+            };
+            for (const Candidate<S>& c : rows[row].candidates()) {
+                relax(c.measurement, rows[row].log_missed - c.log_ratio);
+            }
+            relax(kMaxMeasurements + static_cast<int>(row), S(0));
+            int nearest = kNobody;
+            for (int c = 0; c < kColumns; ++c) {
+                const auto i = static_cast<std::size_t>(c);
+                if (!reached[i] || done[i]) continue;
+                if (nearest == kNobody || distance[i] < distance[static_cast<std::size_t>(nearest)])
+                    nearest = c;
+            }
+            const auto n = static_cast<std::size_t>(nearest);  // a row's own missed column is always reached
+            travelled = distance[n];
+            done[n] = true;
+            if (row_of[n] == kNobody) {
+                last = nearest;
+                break;
+            }
+            row = static_cast<std::size_t>(row_of[n]);
+            from = nearest;
+        }
+        for (int c = 0; c < kColumns; ++c) {
+            const auto i = static_cast<std::size_t>(c);
+            if (!done[i] || c == last) continue;
+            const S slack = travelled - distance[i];
+            column_price[i] -= slack;
+            row_price[static_cast<std::size_t>(row_of[i])] += slack;
+        }
+        row_price[start] += travelled;
+        for (int c = last; c != kNobody;) {
+            const int before = previous[static_cast<std::size_t>(c)];
+            row_of[static_cast<std::size_t>(c)] = before == kNobody
+                                                      ? static_cast<std::int8_t>(start)
+                                                      : row_of[static_cast<std::size_t>(before)];
+            c = before;
+        }
+    }
+    for (std::size_t t = 0; t < rows.size(); ++t) {
+        for (int i = 0; i < rows[t].count; ++i) {
+            const auto m = rows[t].item[static_cast<std::size_t>(i)].measurement;
+            if (row_of[m] == static_cast<std::int8_t>(t)) dominants.claim(t, i, rows[t]);
+        }
+    }
+}
+
+}  // namespace detail
+
+/// Reshapes the weights of all rows (at most kMaxTracks, measurement indices below kMaxMeasurements); each
+/// row's weights sum to 1 afterwards. A row none of whose candidates has a probability keeps its prediction.
+template <class S>
+void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsConfig<S>& config) {
+    const std::span<const AssociationRow<S>> read(rows);
+    detail::Dominants dominants;
+    switch (config.precedence) {
+        case Precedence::index:
+            detail::choose_by_index(read, dominants);
+            break;
+        case Precedence::strength:
+            detail::choose_by_strength(read, dominants);
+            break;
+        case Precedence::optimal:
+            detail::choose_optimally(read, dominants);
+            break;
+    }
+    const auto divisor = reciprocal(config.alpha);
+    for (std::size_t t = 0; t < rows.size(); ++t) {
+        AssociationRow<S>& row = rows[t];
+        S sum(0);
+        for (int i = 0; i < row.count; ++i) {
+            Candidate<S>& c = row.item[static_cast<std::size_t>(i)];
+            c.weight = c.beta;
+            const int owner = dominants.owner[c.measurement];
+            const bool claimed = owner != detail::kNobody && owner != static_cast<int>(t);
+            if (i != dominants.candidate[t] && (claimed || config.reduced == Reduced::all_but_dominant)) {
+                if (config.reduction == Reduction::divide) {
+                    c.weight = c.beta * divisor;
+                } else if (claimed) {
+                    const auto o = static_cast<std::size_t>(owner);
+                    const Candidate<S>& claim =
+                        rows[o].item[static_cast<std::size_t>(dominants.candidate[o])];
+                    c.weight = c.beta * (S(1) - claim.beta);
+                }
+            }
+            sum += c.weight;
+        }
+        row.missed_weight = config.missed == MissedColumn::keep ? row.missed : S(0);
+        sum += row.missed_weight;
+        if (sum <= S(0)) {
+            row.missed_weight = S(1);
+            sum = S(1);
+        }
+        const auto scale = reciprocal(sum);
+        row.missed_weight = row.missed_weight * scale;
+        for (Candidate<S>& c : row.candidates()) c.weight = c.weight * scale;
+    }
+    if (config.covariance == CovarianceBetas::original) return;
+    for (AssociationRow<S>& row : rows) {
+        for (Candidate<S>& c : row.candidates()) c.beta = c.weight;
+        row.missed = row.missed_weight;
+    }
+}
+
+}  // namespace tracking

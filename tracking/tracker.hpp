@@ -1,0 +1,472 @@
+/// Multi-target tracker: detections of a frame in, tracks out. One source for `double` and fixed point.
+///
+/// A frame, in order: predict; associate and update confirmed tracks; do the same for tentative tracks with
+/// the measurements confirmed ones did not claim; start tracks from pairs of measurements nobody claimed in
+/// this frame and the last; confirm, merge, delete.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "tracking/association.hpp"
+#include "tracking/gating.hpp"
+#include "tracking/kalman.hpp"
+#include "tracking/order_statistics.hpp"
+#include "tracking/pda.hpp"
+#include "tracking/scalar.hpp"
+#include "tracking/track.hpp"
+
+namespace tracking {
+
+inline constexpr int kMaxTentative = kMaxTracks - kMaxConfirmed;
+
+/// How measurements are shared out among tracks.
+enum class Associator : std::uint8_t {
+    nn,     ///< nearest neighbour, each track for itself
+    pda,    ///< probabilistic data association, each track for itself
+    ospda,  ///< order statistics over PDA
+};
+
+template <class S>
+struct TrackerConfig {
+    MotionModel<S> motion;
+    GateConfig<S> gate;
+    Associator associator = Associator::ospda;
+    OrderStatisticsConfig<S> order_statistics;
+
+    /// Two targets nearer than this in range and in range rate may be one detection: about two cells each.
+    S resolution_range_m = S(10);
+    S resolution_rate_mps = S(2);
+
+    /// Range rates a new track may have. Rates outside +-rate_span/2 are measured folded; the change of range
+    /// between the two measurements of a start tells which fold it is.
+    S min_start_rate_mps = S(-80);
+    S max_start_rate_mps = S(45);
+    S max_range_m = S(170);  ///< a track predicted beyond this, or behind the radar, is deleted
+
+    /// Existence: probability that the track is a target. Prior after the two measurements of a start, chance
+    /// of a target to remain from one frame to the next, and thresholds.
+    S initial_existence = constant<S>(2, 10);
+    S survival = constant<S>(998, 1000);
+    S confirm_existence = constant<S>(98, 100);
+    S delete_existence = constant<S>(1, 100);
+    std::uint8_t confirm_hits = 3;  ///< measurements before confirmation; 3 in a row confirm in 0.3 s
+    std::uint8_t max_misses = 50;   ///< frames in a row a confirmed track is coasted at most
+
+    S merge_distance2 =
+        S(1);  ///< tracks nearer than this (in their joint covariance) cannot be told apart ...
+    std::uint8_t merge_frames = 10;  ///< ... and after this many frames in a row the younger is dropped
+    S replace_margin_db = S(3);      ///< by how much stronger a track must be to take a confirmed one's place
+
+    [[nodiscard]] constexpr bool valid() const {
+        return motion.valid() && gate.valid() && order_statistics.valid() &&
+               associator <= Associator::ospda && resolution_range_m >= S(0) && resolution_rate_mps >= S(0) &&
+               min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) && initial_existence > S(0) &&
+               initial_existence < S(1) && survival > S(0) && survival <= S(1) && delete_existence > S(0) &&
+               delete_existence < initial_existence && confirm_existence > initial_existence &&
+               confirm_existence < S(1) && confirm_hits >= 2 && max_misses >= 1 && merge_distance2 >= S(0) &&
+               merge_frames >= 1 && replace_margin_db >= S(0);
+    }
+};
+
+/// What happened in one frame.
+struct TrackerReport {
+    int initiated = 0;
+    int confirmed = 0;
+    int deleted = 0;  ///< tentative and confirmed, merged ones and those out of the field not included
+    int merged = 0;
+    int left = 0;                  ///< out of the field of view
+    int dropped_for_capacity = 0;  ///< tracks not started, not confirmed or given up for a stronger one
+    int dropped_measurements = 0;  ///< beyond kMaxMeasurements
+    int invalid_measurements = 0;  ///< not finite, or a variance that is not positive
+    int gate_overflow = 0;         ///< measurements in a gate beyond kMaxGated
+};
+
+/// All memory is inside the object (kMaxConfirmed association rows are most of it). A step is bounded:
+/// kMaxTracks gates over kMaxMeasurements, one association of at most kMaxConfirmed rows twice,
+/// kMaxMeasurements^2 pair tests to start tracks, kMaxTracks^2 merge tests.
+template <class S>
+class Tracker {
+  public:
+    explicit Tracker(const TrackerConfig<S>& config) : config_(config), gate_(config.gate) {}
+
+    /// One frame, one period after the last. Of more than kMaxMeasurements the first are used: give them
+    /// strongest first.
+    TrackerReport step(std::span<const Measurement<S>> measurements);
+
+    /// All tracks, oldest first. Valid until the next step.
+    [[nodiscard]] std::span<const Track<S>> tracks() const {
+        return {track_.data(), static_cast<std::size_t>(count_)};
+    }
+
+    /// Forgets all tracks, and which ids were given.
+    void reset() {
+        count_ = 0;
+        pending_count_ = 0;
+        last_id_ = 0;
+    }
+
+    [[nodiscard]] const TrackerConfig<S>& config() const { return config_; }
+
+  private:
+    static constexpr std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
+
+    std::span<Track<S>> live() { return {track_.data(), static_cast<std::size_t>(count_)}; }
+    [[nodiscard]] int count_of(bool confirmed) const {
+        int n = 0;
+        for (const Track<S>& t : tracks()) n += t.is_confirmed() == confirmed ? 1 : 0;
+        return n;
+    }
+
+    static bool usable(const Measurement<S>& m) {
+        return is_finite(m.z[0]) && is_finite(m.z[1]) && is_finite(m.variance[0]) &&
+               is_finite(m.variance[1]) && is_finite(m.snr_db) && m.variance[0] > S(0) &&
+               m.variance[1] > S(0);
+    }
+
+    void predict();
+    [[nodiscard]] bool obscured(const Track<S>& track) const;
+    std::uint64_t associate(bool confirmed, std::span<const Measurement<S>> measurements,
+                            std::uint64_t usable, TrackerReport& report);
+    void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
+    void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
+    bool best_start(const Measurement<S>& from, const Measurement<S>& to, S& distance2,
+                    Track<S>& track) const;
+    bool make_room_for_tentative(S snr_db, TrackerReport& report);
+    bool make_room_for_confirmed(S snr_db, TrackerReport& report);
+    void confirm(TrackerReport& report);
+    void merge(TrackerReport& report);
+    void remove_lost(TrackerReport& report);
+    void remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed);
+    std::uint8_t next_id();
+    void erase_free();
+
+    TrackerConfig<S> config_;
+    Gate<S> gate_;
+    std::array<Track<S>, kMaxTracks> track_{};
+    std::array<AssociationRow<S>, kMaxConfirmed> row_{};
+    std::array<Measurement<S>, kMaxMeasurements> pending_{};  // unclaimed measurements of the last frame
+    int count_ = 0;
+    int pending_count_ = 0;
+    std::uint8_t last_id_ = 0;
+};
+static_assert(kMaxTentative <= kMaxConfirmed, "row_ serves both in turn");
+static_assert(kMaxMeasurements <= 64, "sets of measurements are kept in 64 bits");
+
+template <class S>
+TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
+    TrackerReport report;
+    if (measurements.size() > kMaxMeasurements) {
+        report.dropped_measurements = static_cast<int>(measurements.size() - kMaxMeasurements);
+        measurements = measurements.first(kMaxMeasurements);
+    }
+    std::uint64_t free = 0;
+    for (std::size_t i = 0; i < measurements.size(); ++i) {
+        if (usable(measurements[i])) {
+            free |= bit(i);
+        } else {
+            ++report.invalid_measurements;
+        }
+    }
+    predict();
+    free &= ~associate(true, measurements, free, report);
+    free &= ~associate(false, measurements, free, report);
+    remove_lost(report);
+    start(measurements, free, report);
+    confirm(report);
+    merge(report);
+    return report;
+}
+
+template <class S>
+void Tracker<S>::predict() {
+    for (Track<S>& t : live()) {
+        t.x = predict_state(t.x, config_.motion);
+        t.covariance = predict_covariance(t.covariance, config_.motion);
+        t.existence *= config_.survival;
+        if (t.age < 0xFFFF) ++t.age;
+    }
+}
+
+/// Another confirmed track is so near that the two may give one detection.
+template <class S>
+bool Tracker<S>::obscured(const Track<S>& track) const {
+    for (const Track<S>& other : tracks()) {
+        if (!other.is_confirmed() || other.id == track.id) continue;
+        const Vec2<S> d = gate_.innovation(track.x, other.x);
+        if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps)
+            return true;
+    }
+    return false;
+}
+
+/// Gates, associates and updates all confirmed or all tentative tracks. Returns the claimed measurements.
+template <class S>
+std::uint64_t Tracker<S>::associate(bool confirmed, std::span<const Measurement<S>> measurements,
+                                    std::uint64_t usable, TrackerReport& report) {
+    std::size_t rows = 0;
+    for (const Track<S>& t : tracks()) {
+        if (t.is_confirmed() != confirmed) continue;
+        AssociationRow<S>& row = row_[rows++];
+        gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t));
+        report.gate_overflow += row.dropped;
+    }
+    const std::span<AssociationRow<S>> all(row_.data(), rows);
+    pda(all);
+    switch (config_.associator) {
+        case Associator::nn:
+            nearest_neighbour(all);
+            break;
+        case Associator::pda:
+            break;
+        case Associator::ospda:
+            order_statistics(all, config_.order_statistics);
+            break;
+    }
+
+    std::array<S, kMaxMeasurements> share{};
+    rows = 0;
+    for (Track<S>& t : live()) {
+        if (t.is_confirmed() != confirmed) continue;
+        const AssociationRow<S>& row = row_[rows++];
+        for (const Candidate<S>& c : row.candidates()) share[c.measurement] += c.weight;
+        update(t, row, measurements);
+    }
+    std::uint64_t claimed = 0;
+    for (std::size_t i = 0; i < measurements.size(); ++i) {
+        if (share[i] >= constant<S>(1, 2)) claimed |= bit(i);
+    }
+    return claimed;
+}
+
+template <class S>
+void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
+                        std::span<const Measurement<S>> measurements) {
+    update_with_row(track.x, track.covariance, row, measurements, gate_);
+
+    // psi <- L psi / (1 - psi + L psi), L the evidence; L may be e^+-30, so whichever of L and 1/L is small
+    // is used.
+    const S doubt = S(1) - track.existence;
+    if (row.log_evidence > S(0)) {
+        const S against = doubt * exp(-row.log_evidence);
+        track.existence = track.existence * reciprocal(S(track.existence + against));
+    } else {
+        const S in_favour = track.existence * exp(row.log_evidence);
+        track.existence = in_favour * reciprocal(S(in_favour + doubt));
+    }
+
+    track.measured = row.missed_weight < constant<S>(1, 2);
+    if (!track.measured) {
+        if (track.misses < 0xFF) ++track.misses;
+        if (track.is_confirmed()) track.state = TrackState::coasting;
+        return;
+    }
+    track.misses = 0;
+    if (track.hits < 0xFF) ++track.hits;
+    if (track.is_confirmed()) track.state = TrackState::confirmed;
+    const Candidate<S>* main = nullptr;
+    for (const Candidate<S>& c : row.candidates()) {
+        if (main == nullptr || c.weight > main->weight) main = &c;
+    }
+    track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 4);
+}
+
+/// The track two measurements make, one period apart, if their range difference agrees with their range rates
+/// for one of the possible folds and both rates agree.
+template <class S>
+bool Tracker<S>::best_start(const Measurement<S>& from, const Measurement<S>& to, S& distance2,
+                            Track<S>& track) const {
+    const S span = config_.gate.rate_span_mps;
+    const int folds = span > S(0) ? 1 : 0;
+    bool found = false;
+    for (int fold = -folds; fold <= folds; ++fold) {
+        Vec2<S> x(from.z[0] - config_.gate.alias_range_m * fold, from.z[1] + span * fold);
+        if (x[1] < config_.min_start_rate_mps || x[1] > config_.max_start_rate_mps) continue;
+        x = predict_state(x, config_.motion);
+        const Vec2<S> nu = gate_.innovation(x, to.z);
+        Mat2<S> p = Mat2<S>::Zero();
+        p(0, 0) = from.variance[0];
+        p(1, 1) = from.variance[1];
+        p = predict_covariance(p, config_.motion);
+        S d2(0);
+        S log_density(0);
+        if (!gate_.test(nu, p, to.variance, d2, log_density)) continue;
+        if (found && d2 >= distance2) continue;
+        found = true;
+        distance2 = d2;
+        track.x = x;
+        track.covariance = p;
+    }
+    return found;
+}
+
+template <class S>
+void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
+                       TrackerReport& report) {
+    std::uint64_t used = 0;
+    std::uint64_t left = unclaimed;
+    for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
+        const auto index = static_cast<std::size_t>(std::countr_zero(rest));
+        const Measurement<S>& m = measurements[index];
+        Track<S> best;
+        S best_distance2(0);
+        int partner = -1;
+        for (int i = 0; i < pending_count_; ++i) {
+            const auto from = static_cast<std::size_t>(i);
+            if ((used & bit(from)) != 0) continue;
+            Track<S> candidate;
+            S distance2(0);
+            if (!best_start(pending_[from], m, distance2, candidate)) continue;
+            if (partner >= 0 && distance2 >= best_distance2) continue;
+            best = candidate;
+            best_distance2 = distance2;
+            partner = i;
+        }
+        if (partner < 0) continue;
+        if (!make_room_for_tentative(m.snr_db, report)) continue;
+        used |= bit(static_cast<std::size_t>(partner));
+        left &= ~bit(index);
+        const Vec2<S> nu = gate_.innovation(best.x, m.z);
+        const Mat2<S> k = gain(best.covariance, Ldl<S>(innovation_covariance(best.covariance, m.variance)));
+        const Vec2<S> move = correction(k, nu);
+        best.x[0] += move[0];
+        best.x[1] += move[1];
+        best.covariance = posterior_covariance(best.covariance, k, m.variance);
+        best.id = next_id();
+        best.state = TrackState::tentative;
+        best.existence = config_.initial_existence;
+        best.snr_db = m.snr_db;
+        best.age = 1;
+        best.hits = 2;
+        best.measured = true;
+        track_[static_cast<std::size_t>(count_++)] = best;
+        ++report.initiated;
+    }
+    remember(measurements, left);
+}
+
+template <class S>
+void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed) {
+    pending_count_ = 0;
+    for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
+        pending_[static_cast<std::size_t>(pending_count_++)] =
+            measurements[static_cast<std::size_t>(std::countr_zero(rest))];
+    }
+}
+
+/// With kMaxTentative already, the weakest gives way to a stronger one.
+template <class S>
+bool Tracker<S>::make_room_for_tentative(S snr_db, TrackerReport& report) {
+    if (count_of(false) < kMaxTentative) return true;
+    ++report.dropped_for_capacity;
+    Track<S>* weakest = nullptr;
+    for (Track<S>& t : live()) {
+        if (!t.is_confirmed() && (weakest == nullptr || t.snr_db < weakest->snr_db)) weakest = &t;
+    }
+    if (snr_db <= weakest->snr_db) return false;
+    weakest->state = TrackState::free;
+    erase_free();
+    return true;
+}
+
+/// With kMaxConfirmed already, the weakest gives way to one stronger by replace_margin_db.
+template <class S>
+bool Tracker<S>::make_room_for_confirmed(S snr_db, TrackerReport& report) {
+    if (count_of(true) < kMaxConfirmed) return true;
+    ++report.dropped_for_capacity;
+    Track<S>* weakest = nullptr;
+    for (Track<S>& t : live()) {
+        if (t.is_confirmed() && (weakest == nullptr || t.snr_db < weakest->snr_db)) weakest = &t;
+    }
+    if (snr_db < weakest->snr_db + config_.replace_margin_db) return false;
+    weakest->state = TrackState::free;
+    return true;
+}
+
+template <class S>
+void Tracker<S>::confirm(TrackerReport& report) {
+    for (Track<S>& t : live()) {
+        if (t.state != TrackState::tentative || t.hits < config_.confirm_hits ||
+            t.existence < config_.confirm_existence || !t.measured) {
+            continue;
+        }
+        if (!make_room_for_confirmed(t.snr_db, report)) continue;
+        t.state = TrackState::confirmed;
+        ++report.confirmed;
+    }
+    erase_free();
+}
+
+/// Two tracks of one target end up at the same place and stay there. Targets that pass each other do so for a
+/// few frames, and a coasting track is too uncertain to judge: hence the count. The younger goes, so that the
+/// id a consumer knows survives; a tentative track always gives way to a confirmed one.
+template <class S>
+void Tracker<S>::merge(TrackerReport& report) {
+    constexpr std::uint8_t kTooUncertain = 3;
+    for (std::size_t younger = 0; younger < static_cast<std::size_t>(count_); ++younger) {
+        Track<S>& b = track_[younger];
+        bool same = false;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(count_) && !same; ++i) {
+            const Track<S>& a = track_[i];
+            if (i == younger || a.state == TrackState::free || a.misses >= kTooUncertain ||
+                b.misses >= kTooUncertain)
+                continue;
+            if (b.is_confirmed() ? (!a.is_confirmed() || i > younger) : (!a.is_confirmed() && i > younger))
+                continue;
+            const Vec2<S> d(a.x[0] - b.x[0], a.x[1] - b.x[1]);
+            const Ldl<S> joint(Mat2<S>(a.covariance + b.covariance));
+            same = joint.valid() && joint.distance2(d) < config_.merge_distance2;
+        }
+        b.overlap = same ? static_cast<std::uint8_t>(b.overlap + 1) : std::uint8_t{0};
+        if (b.overlap < config_.merge_frames) continue;
+        b.state = TrackState::free;
+        ++report.merged;
+    }
+    erase_free();
+}
+
+template <class S>
+void Tracker<S>::remove_lost(TrackerReport& report) {
+    for (Track<S>& t : live()) {
+        if (t.x[0] < S(0) || t.x[0] > config_.max_range_m) {
+            t.state = TrackState::free;
+            ++report.left;
+        } else if (t.existence < config_.delete_existence || t.misses > config_.max_misses) {
+            t.state = TrackState::free;
+            ++report.deleted;
+        }
+    }
+    erase_free();
+}
+
+/// The next id in 1..255 that no track has, going round.
+template <class S>
+std::uint8_t Tracker<S>::next_id() {
+    for (int tries = 0; tries <= kMaxTracks; ++tries) {
+        last_id_ = last_id_ == 255 ? std::uint8_t{1} : static_cast<std::uint8_t>(last_id_ + 1);
+        bool taken = false;
+        for (const Track<S>& t : tracks()) taken = taken || t.id == last_id_;
+        if (!taken) break;
+    }
+    return last_id_;
+}
+
+/// Closes the gaps that freed tracks left, keeping the order.
+template <class S>
+void Tracker<S>::erase_free() {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        if (track_[i].state == TrackState::free) continue;
+        if (kept != i) track_[kept] = track_[i];
+        ++kept;
+    }
+    count_ = static_cast<int>(kept);
+}
+
+/// The one the firmware uses is compiled once, in tracker.cpp.
+extern template class Tracker<dsp::Real>;
+
+}  // namespace tracking
