@@ -1,0 +1,41 @@
+/// A serial line of the PC, for writing.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace hal {
+
+enum class SerialResult : std::uint8_t {
+    ok,
+    timeout,  ///< the other end does not take the bytes; part of them may be on their way
+    failed,   ///< unplugged, or closed by the other end
+};
+
+/// A tty, set to raw 8N1 without flow control, or a UNIX socket, as an emulator's serial line may be. What
+/// comes from the other end is read and thrown away, so that it cannot stand still because nobody listens.
+class SerialPort {
+  public:
+    /// Empty when the line cannot be had; `error` then names cause and remedy. `baud` means nothing to a
+    /// socket.
+    [[nodiscard]] static std::optional<SerialPort> open(const std::string& path, std::uint32_t baud,
+                                                        std::string& error);
+
+    SerialPort(SerialPort&& other) noexcept;
+    SerialPort& operator=(SerialPort&&) = delete;
+    ~SerialPort();
+
+    /// Returns when the last byte has left the PC (as far as the driver can tell), after `timeout_ms` at
+    /// most.
+    [[nodiscard]] SerialResult write(std::span<const std::uint8_t> bytes, int timeout_ms);
+
+  private:
+    SerialPort(int fd, bool tty) : fd_(fd), tty_(tty) {}
+
+    int fd_;
+    bool tty_;
+};
+
+}  // namespace hal
