@@ -1,0 +1,137 @@
+/// The best one-to-one assignment of measurements to tracks, each track free to stay without one.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "tracking/association.hpp"
+#include "tracking/track.hpp"
+
+namespace tracking {
+
+static_assert(kMaxMeasurements <= 64 && kMaxTracks <= 32, "sets of them are held as bits");
+
+/// What the tracks get, and the prices that prove it optimal: for every row t and candidate c of measurement j
+///     weight(t, c) <= row_price[t] + measurement_price[j],   missed_weight(t) <= row_price[t],
+/// with equality on the pairs of the assignment, measurement_price >= 0, and 0 for what nobody got.
+template <class S>
+struct Assignment {
+    static constexpr int kNone = -1;
+
+    std::array<std::int8_t, kMaxTracks> candidate{};        ///< index into the row's candidates, or kNone
+    std::array<std::int8_t, kMaxMeasurements> owner{};      ///< row that got the measurement, or kNone
+    std::array<S, kMaxTracks> row_price{};
+    std::array<S, kMaxMeasurements> measurement_price{};
+};
+
+/// Maximises the sum of `weight(t, c)` over the assigned pairs plus `missed_weight(t)` over the other rows.
+///
+/// Successive shortest augmenting paths with prices (the Hungarian method), rows in order; a tie goes to the
+/// lower measurement index. Fixed point is exact while the weights along a chain of competing tracks sum up
+/// inside the range of S; past that the result is still one-to-one but may not be the best.
+/// At most kMaxTracks rows, measurement indices below kMaxMeasurements. Cost: a row without rivals is one pass
+/// over its candidates; otherwise one such pass for every track it competes with.
+template <class S, class Weight, class MissedWeight>
+void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedWeight missed_weight,
+                 Assignment<S>& out) {
+    struct Reached {
+        S loss = S(0);               ///< by the best chain of rows that give way and end in this measurement
+        std::int8_t row = 0;         ///< last row of that chain
+        std::int8_t candidate = 0;   ///< which of its candidates the measurement is
+    };
+    std::array<Reached, kMaxMeasurements> reached;
+
+    constexpr auto kNone = static_cast<std::int8_t>(Assignment<S>::kNone);
+    out.candidate.fill(kNone);
+    out.owner.fill(kNone);
+    out.measurement_price.fill(S(0));
+
+    const auto measurement_of = [&](int row, int c) {
+        return rows[static_cast<std::size_t>(row)].item[static_cast<std::size_t>(c)].measurement;
+    };
+
+    const int row_count = static_cast<int>(rows.size());
+    for (int start = 0; start < row_count; ++start) {
+        S price = missed_weight(start);
+        for (int c = 0; c < rows[static_cast<std::size_t>(start)].count; ++c) {
+            const S gain = weight(start, c) - out.measurement_price[measurement_of(start, c)];
+            if (gain > price) price = gain;
+        }
+        out.row_price[static_cast<std::size_t>(start)] = price;
+
+        std::uint64_t open = 0;     // measurements reached
+        std::uint64_t settled = 0;  // of these, the ones whose owner was asked to give way
+        S loss = S(0);
+        S loser_loss = S(0);
+        int loser = kNone;  // the row that could go without at the least loss
+        int row = start;
+        int found = kNone;  // a measurement nobody owns
+        while (found == kNone) {
+            const auto t = static_cast<std::size_t>(row);
+            const S without = loss + (out.row_price[t] - missed_weight(row));
+            if (loser == kNone || without < loser_loss) {
+                loser_loss = without;
+                loser = row;
+            }
+            for (int c = 0; c < rows[t].count; ++c) {
+                const std::uint16_t j = measurement_of(row, c);
+                const std::uint64_t bit = std::uint64_t{1} << j;
+                if ((settled & bit) != 0) continue;
+                const S next = loss + (out.row_price[t] + out.measurement_price[j] - weight(row, c));
+                if ((open & bit) == 0 || next < reached[j].loss) {
+                    open |= bit;
+                    reached[j] = {next, static_cast<std::int8_t>(row), static_cast<std::int8_t>(c)};
+                }
+            }
+            int cheapest = kNone;
+            for (std::uint64_t left = open & ~settled; left != 0; left &= left - 1) {
+                const int j = std::countr_zero(left);
+                if (cheapest == kNone ||
+                    reached[static_cast<std::size_t>(j)].loss < reached[static_cast<std::size_t>(cheapest)].loss)
+                    cheapest = j;
+            }
+            if (cheapest == kNone || loser_loss < reached[static_cast<std::size_t>(cheapest)].loss) break;
+            loss = reached[static_cast<std::size_t>(cheapest)].loss;
+            const int owner = out.owner[static_cast<std::size_t>(cheapest)];
+            if (owner == kNone) {
+                found = cheapest;
+            } else {
+                settled |= std::uint64_t{1} << cheapest;
+                row = owner;
+            }
+        }
+        const S end_loss = found == kNone ? loser_loss : loss;
+
+        // The rows on the way accept less; what they compete for costs that much more.
+        for (std::uint64_t left = settled; left != 0; left &= left - 1) {
+            const auto j = static_cast<std::size_t>(std::countr_zero(left));
+            const S raise = end_loss - reached[j].loss;
+            out.measurement_price[j] += raise;
+            out.row_price[static_cast<std::size_t>(out.owner[j])] -= raise;
+        }
+        out.row_price[static_cast<std::size_t>(start)] -= end_loss;
+
+        // Hand the measurements down the chain, from its end back to the new row.
+        int next = found;
+        const auto give_up = [&](int from) {
+            const int c = out.candidate[static_cast<std::size_t>(from)];
+            return c == kNone ? Assignment<S>::kNone : static_cast<int>(measurement_of(from, c));
+        };
+        if (found == kNone) {
+            next = give_up(loser);
+            out.candidate[static_cast<std::size_t>(loser)] = kNone;
+        }
+        while (next != kNone) {
+            const Reached& at = reached[static_cast<std::size_t>(next)];
+            const int freed = give_up(at.row);
+            out.candidate[static_cast<std::size_t>(at.row)] = at.candidate;
+            out.owner[static_cast<std::size_t>(next)] = at.row;
+            next = freed;
+        }
+    }
+}
+
+}  // namespace tracking
