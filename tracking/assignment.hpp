@@ -14,15 +14,16 @@ namespace tracking {
 
 static_assert(kMaxMeasurements <= 64 && kMaxTracks <= 32, "sets of them are held as bits");
 
-/// What the tracks get, and the prices that prove it optimal: for every row t and candidate c of measurement j
+/// What the tracks get, and the prices that prove it optimal: for every row t and candidate c of measurement
+/// j
 ///     weight(t, c) <= row_price[t] + measurement_price[j],   missed_weight(t) <= row_price[t],
 /// with equality on the pairs of the assignment, measurement_price >= 0, and 0 for what nobody got.
 template <class S>
 struct Assignment {
     static constexpr int kNone = -1;
 
-    std::array<std::int8_t, kMaxTracks> candidate{};        ///< index into the row's candidates, or kNone
-    std::array<std::int8_t, kMaxMeasurements> owner{};      ///< row that got the measurement, or kNone
+    std::array<std::int8_t, kMaxTracks> candidate{};    ///< index into the row's candidates, or kNone
+    std::array<std::int8_t, kMaxMeasurements> owner{};  ///< row that got the measurement, or kNone
     std::array<S, kMaxTracks> row_price{};
     std::array<S, kMaxMeasurements> measurement_price{};
 };
@@ -32,15 +33,15 @@ struct Assignment {
 /// Successive shortest augmenting paths with prices (the Hungarian method), rows in order; a tie goes to the
 /// lower measurement index. Fixed point is exact while the weights along a chain of competing tracks sum up
 /// inside the range of S; past that the result is still one-to-one but may not be the best.
-/// At most kMaxTracks rows, measurement indices below kMaxMeasurements. Cost: a row without rivals is one pass
-/// over its candidates; otherwise one such pass for every track it competes with.
+/// At most kMaxTracks rows, measurement indices below kMaxMeasurements. Cost: a row without rivals is one
+/// pass over its candidates; otherwise one such pass for every track it competes with.
 template <class S, class Weight, class MissedWeight>
 void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedWeight missed_weight,
                  Assignment<S>& out) {
     struct Reached {
-        S loss = S(0);               ///< by the best chain of rows that give way and end in this measurement
-        std::int8_t row = 0;         ///< last row of that chain
-        std::int8_t candidate = 0;   ///< which of its candidates the measurement is
+        S loss = S(0);              ///< by the best chain of rows that give way and end in this measurement
+        std::int8_t row = 0;        ///< last row of that chain
+        std::int8_t candidate = 0;  ///< which of its candidates the measurement is
     };
     std::array<Reached, kMaxMeasurements> reached;
 
@@ -89,8 +90,8 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
             int cheapest = kNone;
             for (std::uint64_t left = open & ~settled; left != 0; left &= left - 1) {
                 const int j = std::countr_zero(left);
-                if (cheapest == kNone ||
-                    reached[static_cast<std::size_t>(j)].loss < reached[static_cast<std::size_t>(cheapest)].loss)
+                if (cheapest == kNone || reached[static_cast<std::size_t>(j)].loss <
+                                             reached[static_cast<std::size_t>(cheapest)].loss)
                     cheapest = j;
             }
             if (cheapest == kNone || loser_loss < reached[static_cast<std::size_t>(cheapest)].loss) break;

@@ -47,4 +47,11 @@ struct AssociationRow {
     }
 };
 
+/// Copies the probabilities of a solver to the weights.
+template <class S>
+void use_betas_as_weights(AssociationRow<S>& row) {
+    for (Candidate<S>& c : row.candidates()) c.weight = c.beta;
+    row.missed_weight = row.missed;
+}
+
 }  // namespace tracking

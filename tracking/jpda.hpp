@@ -1,16 +1,19 @@
-/// Joint probabilistic data association: the exact marginals of all one-to-one events, without listing events.
+/// Joint probabilistic data association: the exact marginals of all one-to-one events, without listing
+/// events.
 ///
 /// Source: Fortmann, Bar-Shalom and Scheffe 1983 for the model; the recursion over sets of used tracks is the
 /// sum-product form of the Held-Karp / permanent dynamic programme.
 ///
 /// How the work is kept small and fixed point safe, in this order:
-///   1. Tracks that share no measurement are independent: each connected component, a cluster, is solved alone.
+///   1. Tracks that share no measurement are independent: each connected component, a cluster, is solved
+///   alone.
 ///   2. A measurement only one track can have restricts nobody. It joins the track's "missed" weight and is
 ///      split off again at the end, so only shared measurements cost anything.
 ///   3. All weights are divided by the prices of the best joint event (assignment.hpp). That event and each
 ///      part of it then weighs 1 and no pair weighs more, so nothing that matters underflows, however small
 ///      the likelihoods and however many are multiplied.
-///   4. The recursion runs over subsets of the smaller side (tracks or shared measurements), one step for each
+///   4. The recursion runs over subsets of the smaller side (tracks or shared measurements), one step for
+///   each
 ///      element of the other side.
 /// A cluster past the capacity below is solved by loopy belief propagation instead (Williams and Lau 2014):
 /// approximate, with a fixed number of sweeps, and counted.
@@ -32,7 +35,8 @@ namespace tracking {
 
 /// Subsets are taken of at most this many tracks or measurements.
 inline constexpr int kJpdaMaxItems = 8;
-/// steps * 2^items may not exceed this: 8 tracks with 12 shared measurements, 7 with 24, 6 with 48, 5 with any.
+/// steps * 2^items may not exceed this: 8 tracks with 12 shared measurements, 7 with 24, 6 with 48, 5 with
+/// any.
 inline constexpr int kJpdaTable = 3072;
 inline constexpr int kJpdaMaxPairs = 5 * kMaxMeasurements;
 /// Sweeps of belief propagation over a cluster that does not fit.
@@ -50,13 +54,13 @@ template <class S>
 struct JpdaGraph {
     int steps = 0;
     int items = 0;
-    std::array<S, kJpdaMaxPairs> pair{};             ///< [step * items + item]; in: weight, out: probability
+    std::array<S, kJpdaMaxPairs> pair{};  ///< [step * items + item]; in: weight, out: probability
     std::array<std::uint8_t, kMaxMeasurements> adjacent{};  ///< per step, items with a pair, as bits
-    std::array<S, kMaxMeasurements> step_alone{};    ///< in: weight unmatched, out: probability
+    std::array<S, kMaxMeasurements> step_alone{};           ///< in: weight unmatched, out: probability
     std::array<S, kJpdaMaxItems> item_alone{};
 };
 
-/// Scratch memory of associate_jpda, sizeof(JpdaWorkspace<dsp::Real>) = 18 KiB, static on the targets.
+/// Scratch memory of jpda, sizeof(JpdaWorkspace<dsp::Real>) = 15.6 KiB, static on the targets.
 template <class S>
 struct JpdaWorkspace {
     JpdaGraph<S> graph;
@@ -108,7 +112,9 @@ bool exact_marginals(JpdaGraph<S>& graph, std::span<S> table, std::span<S> used)
     const int items = graph.items;
     const int steps = graph.steps;
     const std::size_t sets = std::size_t{1} << items;
-    const auto backward = [&](int step) { return table.subspan(static_cast<std::size_t>(step) * sets, sets); };
+    const auto backward = [&](int step) {
+        return table.subspan(static_cast<std::size_t>(step) * sets, sets);
+    };
     const auto weight = [&](int step, int item) -> S& {
         return graph.pair[static_cast<std::size_t>(step * items + item)];
     };
@@ -127,7 +133,8 @@ bool exact_marginals(JpdaGraph<S>& graph, std::span<S> table, std::span<S> used)
         for (std::size_t set = 0; set < sets; ++set) {
             WideSum<S> sum;
             sum.add_product(next[set], alone);
-            for (std::size_t left = graph.adjacent[static_cast<std::size_t>(k)] & ~set; left != 0; left &= left - 1)
+            for (std::size_t left = graph.adjacent[static_cast<std::size_t>(k)] & ~set; left != 0;
+                 left &= left - 1)
                 sum.add_product(next[set | (left & (~left + 1))], weight(k, std::countr_zero(left)));
             here[set] = sum.value();
         }
@@ -199,14 +206,17 @@ bool exact_marginals(JpdaGraph<S>& graph, std::span<S> table, std::span<S> used)
     return true;
 }
 
-/// Belief propagation on the rows of one cluster. In: the beta of shared candidates and `missed` hold weights,
-/// `alone` the weight of a measurement nobody takes. Out: probabilities.
-/// Every sweep lets each track tell each shared measurement how strongly it claims it against its
-/// alternatives, and hear how free of others' claims the measurement is.
+/// Belief propagation on the rows of one cluster. In: the beta of shared candidates and `missed` hold
+/// weights, `alone` the weight of a measurement nobody takes. Out: probabilities. Every sweep lets each track
+/// tell each shared measurement how strongly it claims it against its alternatives, and hear how free of
+/// others' claims the measurement is.
 template <class S>
-void approximate_marginals(std::span<AssociationRow<S>> rows, std::uint32_t cluster, std::uint64_t measurements,
-                           const std::array<S, kMaxMeasurements>& alone, std::span<S> claim) {
-    const auto is_private = [&](const Candidate<S>& item) { return (measurements >> item.measurement & 1) == 0; };
+void approximate_marginals(std::span<AssociationRow<S>> rows, std::uint32_t cluster,
+                           std::uint64_t measurements, const std::array<S, kMaxMeasurements>& alone,
+                           std::span<S> claim) {
+    const auto is_private = [&](const Candidate<S>& item) {
+        return (measurements >> item.measurement & 1) == 0;
+    };
     const auto claim_of = [&](std::size_t t, std::size_t c) -> S& { return claim[t * kMaxGated + c]; };
     std::array<WideSum<S>, kMaxMeasurements> claims{};
     for (std::uint32_t left = cluster; left != 0; left &= left - 1) {
@@ -325,15 +335,15 @@ bool solve_cluster(std::span<AssociationRow<S>> rows, std::uint32_t cluster, std
 
 }  // namespace detail
 
-/// Fills beta and missed of every row with the JPDA marginals of log_ratio and log_missed.
+/// Fills beta, missed and the weights of every row with the JPDA marginals of log_ratio and log_missed.
 ///
 /// Double: within 1e-12 of listing all events. dsp::Real: within 2e-3, rows sum to 1 within 1e-3. Certain
 /// detection (log_missed = -inf, or the smallest S) and any likelihood are allowed.
 /// At most kMaxTracks rows; measurement indices below kMaxMeasurements, ascending within a row.
-/// Cost a cluster: exact at most 3 * kJpdaTable * kJpdaMaxItems / 2, about 37,000, multiply-adds; approximated
-/// 2 * kBeliefSweeps = 24 divisions a pair, at most 12,300 for all 32 x 16 pairs.
+/// Cost a cluster: exact at most 3 * kJpdaTable * kJpdaMaxItems / 2, about 37,000, multiply-adds;
+/// approximated 2 * kBeliefSweeps = 24 divisions a pair, at most 12,300 for all 32 x 16 pairs.
 template <class S>
-JpdaStatus associate_jpda(std::span<AssociationRow<S>> rows, JpdaWorkspace<S>& work) {
+JpdaStatus jpda(std::span<AssociationRow<S>> rows, JpdaWorkspace<S>& work) {
     JpdaStatus status;
     work.users.fill(0);
     for (std::size_t t = 0; t < rows.size(); ++t)
@@ -410,6 +420,7 @@ JpdaStatus associate_jpda(std::span<AssociationRow<S>> rows, JpdaWorkspace<S>& w
         row.missed = own * work.missed_weight[t];
         for (Candidate<S>& c : row.candidates())
             if (!is_shared(c)) c.beta *= own;
+        use_betas_as_weights(row);
     }
     return status;
 }

@@ -13,6 +13,7 @@
 #include <limits>
 #include <span>
 
+#include "tracking/assignment.hpp"
 #include "tracking/association.hpp"
 #include "tracking/scalar.hpp"
 #include "tracking/track.hpp"
@@ -125,79 +126,17 @@ void choose_by_strength(std::span<const AssociationRow<S>> rows, Dominants& domi
     }
 }
 
-/// Shortest augmenting paths (Jonker and Volgenant 1987) over the measurements and one private "missed"
-/// column a row. Cost of a candidate: ln of the row's missed term minus ln of its ratio. At most rows^2
-/// (measurements + rows) steps.
 template <class S>
 void choose_optimally(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
-    constexpr int kColumns = kMaxMeasurements + kMaxTracks;
-    std::array<S, kMaxTracks> row_price{};
-    std::array<S, kColumns> column_price{};
-    std::array<std::int8_t, kColumns> row_of;
-    row_of.fill(kNobody);
-
-    for (std::size_t start = 0; start < rows.size(); ++start) {
-        std::array<S, kColumns> distance;
-        std::array<std::int8_t, kColumns> previous;  // column before, kNobody: the starting row
-        std::array<bool, kColumns> reached{};
-        std::array<bool, kColumns> done{};
-        previous.fill(kNobody);
-        std::size_t row = start;
-        int from = kNobody;
-        S travelled(0);
-        int last = kNobody;
-        for (std::size_t step = 0; step <= rows.size(); ++step) {
-            const auto relax = [&](int column, S cost) {
-                const auto c = static_cast<std::size_t>(column);
-                if (done[c]) return;
-                const S d = travelled + cost - row_price[row] - column_price[c];
-                if (reached[c] && d >= distance[c]) return;
-                reached[c] = true;
-                distance[c] = d;
-                previous[c] = static_cast<std::int8_t>(from);
-            };
-            for (const Candidate<S>& c : rows[row].candidates()) {
-                relax(c.measurement, rows[row].log_missed - c.log_ratio);
-            }
-            relax(kMaxMeasurements + static_cast<int>(row), S(0));
-            int nearest = kNobody;
-            for (int c = 0; c < kColumns; ++c) {
-                const auto i = static_cast<std::size_t>(c);
-                if (!reached[i] || done[i]) continue;
-                if (nearest == kNobody || distance[i] < distance[static_cast<std::size_t>(nearest)])
-                    nearest = c;
-            }
-            const auto n = static_cast<std::size_t>(nearest);  // a row's own missed column is always reached
-            travelled = distance[n];
-            done[n] = true;
-            if (row_of[n] == kNobody) {
-                last = nearest;
-                break;
-            }
-            row = static_cast<std::size_t>(row_of[n]);
-            from = nearest;
-        }
-        for (int c = 0; c < kColumns; ++c) {
-            const auto i = static_cast<std::size_t>(c);
-            if (!done[i] || c == last) continue;
-            const S slack = travelled - distance[i];
-            column_price[i] -= slack;
-            row_price[static_cast<std::size_t>(row_of[i])] += slack;
-        }
-        row_price[start] += travelled;
-        for (int c = last; c != kNobody;) {
-            const int before = previous[static_cast<std::size_t>(c)];
-            row_of[static_cast<std::size_t>(c)] = before == kNobody
-                                                      ? static_cast<std::int8_t>(start)
-                                                      : row_of[static_cast<std::size_t>(before)];
-            c = before;
-        }
-    }
+    Assignment<S> best;
+    assign_best(
+        rows,
+        [&](int t, int c) {
+            return rows[static_cast<std::size_t>(t)].item[static_cast<std::size_t>(c)].log_ratio;
+        },
+        [&](int t) { return rows[static_cast<std::size_t>(t)].log_missed; }, best);
     for (std::size_t t = 0; t < rows.size(); ++t) {
-        for (int i = 0; i < rows[t].count; ++i) {
-            const auto m = rows[t].item[static_cast<std::size_t>(i)].measurement;
-            if (row_of[m] == static_cast<std::int8_t>(t)) dominants.claim(t, i, rows[t]);
-        }
+        if (best.candidate[t] != kNobody) dominants.claim(t, best.candidate[t], rows[t]);
     }
 }
 

@@ -1,5 +1,5 @@
-/// Association track by track: nearest neighbour and probabilistic data association (Bar-Shalom and Tse
-/// 1975), and the update of a filter with several weighted measurements.
+/// Probabilistic data association, each track for itself (Bar-Shalom and Tse 1975), and the update of a
+/// filter with several weighted measurements.
 #pragma once
 
 #include <array>
@@ -11,13 +11,6 @@
 #include "tracking/kalman.hpp"
 
 namespace tracking {
-
-/// Copies the probabilities of a solver to the weights.
-template <class S>
-void use_betas_as_weights(AssociationRow<S>& row) {
-    for (Candidate<S>& c : row.candidates()) c.weight = c.beta;
-    row.missed_weight = row.missed;
-}
 
 /// beta_j = ratio_j / (1 - PD PG + sum of ratios), beta_0 the rest. In the logarithmic domain, relative to
 /// the largest term: whatever the scale of the ratios, a row sums to 1 and never vanishes.
@@ -38,20 +31,6 @@ void pda(std::span<AssociationRow<S>> rows) {
         const auto scale = reciprocal(sum);
         row.missed = row.missed * scale;
         for (Candidate<S>& c : row.candidates()) c.beta = c.beta * scale;
-        use_betas_as_weights(row);
-    }
-}
-
-/// The likeliest measurement in the gate is taken as the track's, without doubt; each track for itself.
-template <class S>
-void nearest_neighbour(std::span<AssociationRow<S>> rows) {
-    for (AssociationRow<S>& row : rows) {
-        const Candidate<S>* nearest = nullptr;
-        for (const Candidate<S>& c : row.candidates()) {
-            if (nearest == nullptr || c.log_ratio > nearest->log_ratio) nearest = &c;
-        }
-        for (Candidate<S>& c : row.candidates()) c.beta = &c == nearest ? S(1) : S(0);
-        row.missed = nearest == nullptr ? S(1) : S(0);
         use_betas_as_weights(row);
     }
 }

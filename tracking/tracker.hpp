@@ -12,6 +12,7 @@
 #include <span>
 
 #include "tracking/association.hpp"
+#include "tracking/associator.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/kalman.hpp"
 #include "tracking/order_statistics.hpp"
@@ -22,13 +23,6 @@
 namespace tracking {
 
 inline constexpr int kMaxTentative = kMaxTracks - kMaxConfirmed;
-
-/// How measurements are shared out among tracks.
-enum class Associator : std::uint8_t {
-    nn,     ///< nearest neighbour, each track for itself
-    pda,    ///< probabilistic data association, each track for itself
-    ospda,  ///< order statistics over PDA
-};
 
 template <class S>
 struct TrackerConfig {
@@ -63,12 +57,12 @@ struct TrackerConfig {
 
     [[nodiscard]] constexpr bool valid() const {
         return motion.valid() && gate.valid() && order_statistics.valid() &&
-               associator <= Associator::ospda && resolution_range_m >= S(0) && resolution_rate_mps >= S(0) &&
-               min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) && initial_existence > S(0) &&
-               initial_existence < S(1) && survival > S(0) && survival <= S(1) && delete_existence > S(0) &&
-               delete_existence < initial_existence && confirm_existence > initial_existence &&
-               confirm_existence < S(1) && confirm_hits >= 2 && max_misses >= 1 && merge_distance2 >= S(0) &&
-               merge_frames >= 1 && replace_margin_db >= S(0);
+               associator <= Associator::osjpda && resolution_range_m >= S(0) &&
+               resolution_rate_mps >= S(0) && min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) &&
+               initial_existence > S(0) && initial_existence < S(1) && survival > S(0) && survival <= S(1) &&
+               delete_existence > S(0) && delete_existence < initial_existence &&
+               confirm_existence > initial_existence && confirm_existence < S(1) && confirm_hits >= 2 &&
+               max_misses >= 1 && merge_distance2 >= S(0) && merge_frames >= 1 && replace_margin_db >= S(0);
     }
 };
 
@@ -83,6 +77,7 @@ struct TrackerReport {
     int dropped_measurements = 0;  ///< beyond kMaxMeasurements
     int invalid_measurements = 0;  ///< not finite, or a variance that is not positive
     int gate_overflow = 0;         ///< measurements in a gate beyond kMaxGated
+    int approximated = 0;          ///< clusters too large for exact JPDA
 };
 
 /// All memory is inside the object (kMaxConfirmed association rows are most of it). A step is bounded:
@@ -129,8 +124,8 @@ class Tracker {
 
     void predict();
     [[nodiscard]] bool obscured(const Track<S>& track) const;
-    std::uint64_t associate(bool confirmed, std::span<const Measurement<S>> measurements,
-                            std::uint64_t usable, TrackerReport& report);
+    std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
+                                       std::uint64_t usable, TrackerReport& report);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
     bool best_start(const Measurement<S>& from, const Measurement<S>& to, S& distance2,
@@ -148,6 +143,7 @@ class Tracker {
     Gate<S> gate_;
     std::array<Track<S>, kMaxTracks> track_{};
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
+    JpdaWorkspace<S> work_{};
     std::array<Measurement<S>, kMaxMeasurements> pending_{};  // unclaimed measurements of the last frame
     int count_ = 0;
     int pending_count_ = 0;
@@ -172,8 +168,8 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
         }
     }
     predict();
-    free &= ~associate(true, measurements, free, report);
-    free &= ~associate(false, measurements, free, report);
+    free &= ~associate_and_update(true, measurements, free, report);
+    free &= ~associate_and_update(false, measurements, free, report);
     remove_lost(report);
     start(measurements, free, report);
     confirm(report);
@@ -205,8 +201,8 @@ bool Tracker<S>::obscured(const Track<S>& track) const {
 
 /// Gates, associates and updates all confirmed or all tentative tracks. Returns the claimed measurements.
 template <class S>
-std::uint64_t Tracker<S>::associate(bool confirmed, std::span<const Measurement<S>> measurements,
-                                    std::uint64_t usable, TrackerReport& report) {
+std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
+                                               std::uint64_t usable, TrackerReport& report) {
     std::size_t rows = 0;
     for (const Track<S>& t : tracks()) {
         if (t.is_confirmed() != confirmed) continue;
@@ -215,17 +211,7 @@ std::uint64_t Tracker<S>::associate(bool confirmed, std::span<const Measurement<
         report.gate_overflow += row.dropped;
     }
     const std::span<AssociationRow<S>> all(row_.data(), rows);
-    pda(all);
-    switch (config_.associator) {
-        case Associator::nn:
-            nearest_neighbour(all);
-            break;
-        case Associator::pda:
-            break;
-        case Associator::ospda:
-            order_statistics(all, config_.order_statistics);
-            break;
-    }
+    report.approximated += associate(all, config_.associator, config_.order_statistics, work_).approximated;
 
     std::array<S, kMaxMeasurements> share{};
     rows = 0;

@@ -114,8 +114,12 @@ std::vector<AssociationRow<Real>> to_fixed(Rows& rows) {
     return fixed;
 }
 
-double to_double(double v) { return v; }
-double to_double(Real v) { return v.raw() / 4194304.0; }
+double to_double(double v) {
+    return v;
+}
+double to_double(Real v) {
+    return v.raw() / 4194304.0;
+}
 
 template <class S>
 double largest_error(const std::vector<AssociationRow<S>>& rows, const EventList& events) {
@@ -146,9 +150,9 @@ JpdaWorkspace<Real> g_fixed_work;
 template <class S>
 JpdaStatus associate(std::vector<AssociationRow<S>>& rows) {
     if constexpr (std::is_same_v<S, double>) {
-        return tracking::associate_jpda<S>(rows, g_work);
+        return tracking::jpda<S>(rows, g_work);
     } else {
-        return tracking::associate_jpda<S>(rows, g_fixed_work);
+        return tracking::jpda<S>(rows, g_fixed_work);
     }
 }
 
