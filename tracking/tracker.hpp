@@ -104,6 +104,13 @@ class Tracker {
         last_id_ = 0;
     }
 
+    /// Another configuration, which must be valid(); begins anew. In place: the object is too large for a
+    /// stack.
+    void configure(const TrackerConfig<S>& config) {
+        config_ = config;
+        gate_ = Gate<S>(config.gate);
+        reset();
+    }
     [[nodiscard]] const TrackerConfig<S>& config() const { return config_; }
 
   private:
