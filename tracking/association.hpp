@@ -32,11 +32,12 @@ template <class S>
 struct AssociationRow {
     std::array<Candidate<S>, kMaxGated> item{};  ///< ascending measurement index
     int count = 0;
-    int dropped = 0;      ///< gated measurements that did not fit
-    S log_missed = S(0);  ///< ln(1 - PD PG)
-    S log_evidence =
-        S(0);         ///< ln(1 - PD PG + sum of ratios): for the track against its absence; set by pda()
-    S missed = S(1);  ///< beta_0: probability that none is
+    int dropped = 0;        ///< gated measurements that did not fit
+    bool obscured = false;  ///< filled for a track whose echo may be one with another track's
+    S log_missed = S(0);    ///< ln(1 - PD PG)
+    /// ln(1 - PD PG + sum of ratios): for the track against its absence. Set by pda().
+    S log_evidence = S(0);
+    S missed = S(1);         ///< beta_0: probability that none is
     S missed_weight = S(1);  ///< share of the prediction in the new estimate
 
     [[nodiscard]] std::span<Candidate<S>> candidates() {

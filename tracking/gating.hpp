@@ -18,11 +18,19 @@ struct GateConfig {
     S gate =
         S(16);  ///< g^2: largest nu' S^-1 nu. 16 is 4 sigma, PG = 0.99966; smaller loses manoeuvring tracks
     S detection_probability = constant<S>(9, 10);  ///< PD of a target in the field of view
-    /// PD of a target so near another that the two echoes may be one detection: a miss says little.
-    S obscured_detection_probability = constant<S>(3, 10);
+    /// For a track so near another that both echoes may be one detection, PD (a miss says little) and what is
+    /// added to the standard deviations (the one detection lies anywhere between the two). Without this, two
+    /// tracks that meet are drawn together and one of them is lost.
+    S obscured_detection_probability = constant<S>(2, 10);
+    S obscured_range_sigma_m = S(1);
+    S obscured_rate_sigma_mps = constant<S>(1, 2);
     /// lambda, false detections a frame per m (m/s); below 2^-22 it is taken as 2^-22. Larger than thermal
     /// false alarms alone (about 2e-5) so that one doubtful detection does not outweigh everything known.
     S clutter_density = constant<S>(5, 10'000);
+    /// Least standard deviations of a measurement: the reflecting point wanders over a vehicle, and two
+    /// echoes in one cell pull each other, whatever the signal-to-noise ratio says.
+    S min_range_sigma_m = constant<S>(15, 100);
+    S min_rate_sigma_mps = constant<S>(5, 100);
     /// Range rates are measured modulo this (wavelength / 2 chirp intervals); 0: unambiguous.
     S rate_span_mps = constant<S>(60'834'496, 1'000'000);
     /// Range error per span of range rate that was folded: coupling_s * rate_span_mps, because the signal
@@ -32,9 +40,12 @@ struct GateConfig {
     [[nodiscard]] constexpr bool valid() const {
         return gate > S(0) && gate <= S(100) && detection_probability > S(0) &&
                detection_probability <= S(1) && obscured_detection_probability >= S(0) &&
-               obscured_detection_probability <= detection_probability && clutter_density >= S(0) &&
-               clutter_density <= S(1) && rate_span_mps >= S(0) && rate_span_mps <= S(400) &&
-               absolute(alias_range_m) <= S(100);
+               obscured_detection_probability <= detection_probability && obscured_range_sigma_m >= S(0) &&
+               obscured_range_sigma_m <= S(10) && obscured_rate_sigma_mps >= S(0) &&
+               obscured_rate_sigma_mps <= S(10) && clutter_density >= S(0) && clutter_density <= S(1) &&
+               min_range_sigma_m >= constant<S>(1, 100) && min_range_sigma_m <= S(10) &&
+               min_rate_sigma_mps >= constant<S>(1, 100) && min_rate_sigma_mps <= S(10) &&
+               rate_span_mps >= S(0) && rate_span_mps <= S(400) && absolute(alias_range_m) <= S(100);
     }
 };
 
@@ -44,6 +55,10 @@ class Gate {
   public:
     explicit Gate(const GateConfig<S>& config)
         : config_(config),
+          least_variance_(config.min_range_sigma_m * config.min_range_sigma_m,
+                          config.min_rate_sigma_mps * config.min_rate_sigma_mps),
+          obscured_variance_(config.obscured_range_sigma_m * config.obscured_range_sigma_m,
+                             config.obscured_rate_sigma_mps * config.obscured_rate_sigma_mps),
           gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
           seen_(logs(config.detection_probability)),
           obscured_(logs(config.obscured_detection_probability)) {}
@@ -62,6 +77,16 @@ class Gate {
             nu[1] += config_.rate_span_mps;
         }
         return nu;
+    }
+
+    /// R: the measurement's variances, not below the configured least, and wider for an obscured track.
+    [[nodiscard]] Vec2<S> noise(const Measurement<S>& m, bool obscured) const {
+        Vec2<S> r;
+        for (int i = 0; i < 2; ++i) {
+            r[i] = m.variance[i] > least_variance_[i] ? m.variance[i] : least_variance_[i];
+            if (obscured) r[i] += obscured_variance_[i];
+        }
+        return r;
     }
 
     /// ln of the likelihood ratio PD N(nu; 0, S) / lambda of a measurement inside the gate; nothing outside,
@@ -86,6 +111,7 @@ class Gate {
         const Logs& logs = obscured ? obscured_ : seen_;
         row.count = 0;
         row.dropped = 0;
+        row.obscured = obscured;
         row.log_missed = logs.missed;
         for (std::uint64_t rest = usable; rest != 0; rest &= rest - 1) {
             const auto index = static_cast<std::size_t>(std::countr_zero(rest));
@@ -93,7 +119,7 @@ class Gate {
             const Measurement<S>& m = measurements[index];
             S distance2(0);
             S log_density(0);
-            if (!test(innovation(x, m.z), p, m.variance, distance2, log_density)) continue;
+            if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) continue;
             insert(row, {static_cast<std::uint16_t>(index), logs.detected + log_density, S(0), S(0)});
         }
     }
@@ -134,6 +160,8 @@ class Gate {
     }
 
     GateConfig<S> config_;
+    Vec2<S> least_variance_;
+    Vec2<S> obscured_variance_;
     S gate_probability_;
     Logs seen_;
     Logs obscured_;

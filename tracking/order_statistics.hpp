@@ -46,11 +46,11 @@ enum class CovarianceBetas : std::uint8_t { reshaped, original };
 template <class S>
 struct OrderStatisticsConfig {
     S alpha = S(4);  ///< > 1; 4 over PDA, 6 over JPDA in the paper. Not used by Reduction::soft
-    Precedence precedence = Precedence::optimal;
+    Precedence precedence = Precedence::strength;
     MissedColumn missed = MissedColumn::keep;
     Reduced reduced = Reduced::claimed_by_others;
     Reduction reduction = Reduction::soft;
-    CovarianceBetas covariance = CovarianceBetas::original;
+    CovarianceBetas covariance = CovarianceBetas::reshaped;
 
     [[nodiscard]] constexpr bool valid() const { return alpha > S(1) && alpha <= S(100); }
 };

@@ -53,12 +53,13 @@ void update_with_row(Vec2<S>& x, Mat2<S>& p, const AssociationRow<S>& row,
         moves[i] = Vec2<S>(S(0), S(0));
         if (c.beta < negligible && c.weight < negligible) continue;
         const Measurement<S>& m = measurements[c.measurement];
-        const Ldl<S> s(innovation_covariance(p, m.variance));
+        const Vec2<S> r = gate.noise(m, row.obscured);
+        const Ldl<S> s(innovation_covariance(p, r));
         const Mat2<S> k = gain(p, s);
         moves[i] = correction(k, gate.innovation(x, m.z));
         mean[0] += c.weight * moves[i][0];
         mean[1] += c.weight * moves[i][1];
-        const Mat2<S> posterior = posterior_covariance(p, k, m.variance);
+        const Mat2<S> posterior = posterior_covariance(p, k, r);
         spread(0, 0) += c.beta * posterior(0, 0);
         spread(0, 1) += c.beta * posterior(0, 1);
         spread(1, 1) += c.beta * posterior(1, 1);

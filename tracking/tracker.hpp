@@ -31,9 +31,10 @@ struct TrackerConfig {
     Associator associator = Associator::ospda;
     OrderStatisticsConfig<S> order_statistics;
 
-    /// Two targets nearer than this in range and in range rate may be one detection: about two cells each.
-    S resolution_range_m = S(10);
-    S resolution_rate_mps = S(2);
+    /// Two targets nearer than this in range and in range rate may be one detection: about two cells each,
+    /// and a margin for the doubt about where a track hidden by another is.
+    S resolution_range_m = S(12);
+    S resolution_rate_mps = S(3);
 
     /// Range rates a new track may have. Rates outside +-rate_span/2 are measured folded; the change of range
     /// between the two measurements of a start tells which fold it is.
@@ -111,6 +112,10 @@ class Tracker {
         gate_ = Gate<S>(config.gate);
         reset();
     }
+
+    /// From the next frame on; tracks are kept.
+    void set_associator(Associator associator) { config_.associator = associator; }
+
     [[nodiscard]] const TrackerConfig<S>& config() const { return config_; }
 
   private:
@@ -281,12 +286,11 @@ bool Tracker<S>::best_start(const Measurement<S>& from, const Measurement<S>& to
         x = predict_state(x, config_.motion);
         const Vec2<S> nu = gate_.innovation(x, to.z);
         Mat2<S> p = Mat2<S>::Zero();
-        p(0, 0) = from.variance[0];
-        p(1, 1) = from.variance[1];
+        p = innovation_covariance(p, gate_.noise(from, false));
         p = predict_covariance(p, config_.motion);
         S d2(0);
         S log_density(0);
-        if (!gate_.test(nu, p, to.variance, d2, log_density)) continue;
+        if (!gate_.test(nu, p, gate_.noise(to, false), d2, log_density)) continue;
         if (found && d2 >= distance2) continue;
         found = true;
         distance2 = d2;
@@ -323,11 +327,12 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         used |= bit(static_cast<std::size_t>(partner));
         left &= ~bit(index);
         const Vec2<S> nu = gate_.innovation(best.x, m.z);
-        const Mat2<S> k = gain(best.covariance, Ldl<S>(innovation_covariance(best.covariance, m.variance)));
+        const Vec2<S> r = gate_.noise(m, false);
+        const Mat2<S> k = gain(best.covariance, Ldl<S>(innovation_covariance(best.covariance, r)));
         const Vec2<S> move = correction(k, nu);
         best.x[0] += move[0];
         best.x[1] += move[1];
-        best.covariance = posterior_covariance(best.covariance, k, m.variance);
+        best.covariance = posterior_covariance(best.covariance, k, r);
         best.id = next_id();
         best.state = TrackState::tentative;
         best.existence = config_.initial_existence;

@@ -155,7 +155,13 @@ TEST(OrderStatistics, SoftFormWorkedByHand) {
     tracking::order_statistics<Real>(rows, OrderStatisticsConfig<Real>{});
     DOUBLES_EQUAL(.8, weight(rows[0], 0), 1e-6);
     DOUBLES_EQUAL(.12 / .52, weight(rows[1], 0), 1e-6);
-    CHECK(rows[1].item[0].beta == constant<Real>(6, 10));  // the covariance keeps the original
+    CHECK(rows[1].item[0].beta == rows[1].item[0].weight);
+    rows = rows_of<Real>({{8000}, {6000}});
+    OrderStatisticsConfig<Real> original;
+    original.covariance = tracking::CovarianceBetas::original;
+    tracking::order_statistics<Real>(rows, original);
+    DOUBLES_EQUAL(.12 / .52, weight(rows[1], 0), 1e-6);
+    CHECK(rows[1].item[0].beta == constant<Real>(6, 10));
 }
 
 TEST(OrderStatistics, EveryVariantLeavesProperRows) {
