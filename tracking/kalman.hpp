@@ -65,7 +65,7 @@ class Ldl {
     }
     /// ln N(v; 0, M), given distance2(v).
     [[nodiscard]] S log_density(S distance2) const {
-        constexpr auto kLn2Pi = constant<S>(1'837'877'066, 1'000'000'000);
+        constexpr auto kLn2Pi = constant<S>(1'837'877'066'409, 1'000'000'000'000);
         return -kLn2Pi - (distance2 + ln(d1_) + ln(d2_)) * constant<S>(1, 2);
     }
     /// M^-1 v.
