@@ -1,10 +1,11 @@
 /// Order-statistics decision logic (Lee and Kim 2000): the association rows of any solver, reshaped so that
 /// each track prefers one measurement and neighbouring tracks do not share it. OSPDA is this over pda(),
-/// OSJPDA is this over JPDA.
+/// OSJPDA is this over jpda().
 ///
 /// As printed: in track order, the dominant measurement of a track is its largest beta among the measurements
 /// not yet dominant for an earlier track; every other beta of the row is divided by alpha; rows are
-/// normalised. What the paper leaves open, or what turned out to matter, is a named option here.
+/// normalised. What the paper leaves open, or what turned out to matter, is a named option here. `radar_study
+/// lee2000` measures the options; the defaults are what it favours, kLeeKim2000 is the literal reading.
 #pragma once
 
 #include <array>
@@ -38,19 +39,28 @@ enum class Reduced : std::uint8_t {
 };
 enum class Reduction : std::uint8_t {
     divide,  ///< by alpha, as printed
-    soft,    ///< times 1 - beta of the track that claims it; where nobody claims it, unchanged
+    /// Of what another track claims only: times 1 - beta of the claimant. No parameter. If the claimants
+    /// claimed with all their betas, two tracks would get exactly their JPDA marginals.
+    soft,
+    /// A track that has a dominant measurement drops what others claim; one that has none may be hidden in a
+    /// claimant's echo and shares it softly. No parameter.
+    exclusive,
 };
 /// Which probabilities the covariance is computed with.
-enum class CovarianceBetas : std::uint8_t { reshaped, original };
+enum class CovarianceBetas : std::uint8_t {
+    reshaped,  ///< as printed: the decision is trusted
+    original,  ///< the solver's: doubt about the decision widens the covariance
+    decided,   ///< reshaped where the track has a dominant measurement, original where it has none
+};
 
 template <class S>
 struct OrderStatisticsConfig {
-    S alpha = S(4);  ///< > 1; 4 over PDA, 6 over JPDA in the paper. Not used by Reduction::soft
-    Precedence precedence = Precedence::strength;
+    S alpha = S(4);  ///< > 1; 4 over PDA, 6 over JPDA in the paper. Used by Reduction::divide only
+    Precedence precedence = Precedence::optimal;
     MissedColumn missed = MissedColumn::keep;
     Reduced reduced = Reduced::claimed_by_others;
-    Reduction reduction = Reduction::soft;
-    CovarianceBetas covariance = CovarianceBetas::reshaped;
+    Reduction reduction = Reduction::exclusive;
+    CovarianceBetas covariance = CovarianceBetas::decided;
 
     [[nodiscard]] constexpr bool valid() const { return alpha > S(1) && alpha <= S(100); }
 };
@@ -162,6 +172,7 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
     const auto divisor = reciprocal(config.alpha);
     for (std::size_t t = 0; t < rows.size(); ++t) {
         AssociationRow<S>& row = rows[t];
+        const bool has_dominant = dominants.candidate[t] != detail::kNobody;
         S sum(0);
         for (int i = 0; i < row.count; ++i) {
             Candidate<S>& c = row.item[static_cast<std::size_t>(i)];
@@ -171,6 +182,8 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             if (i != dominants.candidate[t] && (claimed || config.reduced == Reduced::all_but_dominant)) {
                 if (config.reduction == Reduction::divide) {
                     c.weight = c.beta * divisor;
+                } else if (claimed && config.reduction == Reduction::exclusive && has_dominant) {
+                    c.weight = S(0);
                 } else if (claimed) {
                     const auto o = static_cast<std::size_t>(owner);
                     const Candidate<S>& claim =
@@ -191,7 +204,10 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
         for (Candidate<S>& c : row.candidates()) c.weight = c.weight * scale;
     }
     if (config.covariance == CovarianceBetas::original) return;
-    for (AssociationRow<S>& row : rows) {
+    for (std::size_t t = 0; t < rows.size(); ++t) {
+        if (config.covariance == CovarianceBetas::decided && dominants.candidate[t] == detail::kNobody)
+            continue;
+        AssociationRow<S>& row = rows[t];
         for (Candidate<S>& c : row.candidates()) c.beta = c.weight;
         row.missed = row.missed_weight;
     }

@@ -151,17 +151,39 @@ TEST(OrderStatistics, OptimalPrecedenceIsTheBestAssignmentOfAll) {
 TEST(OrderStatistics, SoftFormWorkedByHand) {
     // Both want the only measurement, ratios 4 and 1.5: row 0 has it. Row 1: .6 (1 - .8) = .12 against .4
     // missed.
+    OrderStatisticsConfig<Real> config;
+    config.reduction = tracking::Reduction::soft;
+    config.covariance = tracking::CovarianceBetas::reshaped;
     auto rows = rows_of<Real>({{8000}, {6000}});
-    tracking::order_statistics<Real>(rows, OrderStatisticsConfig<Real>{});
+    tracking::order_statistics<Real>(rows, config);
     DOUBLES_EQUAL(.8, weight(rows[0], 0), 1e-6);
     DOUBLES_EQUAL(.12 / .52, weight(rows[1], 0), 1e-6);
     CHECK(rows[1].item[0].beta == rows[1].item[0].weight);
+
+    config.covariance = tracking::CovarianceBetas::original;
     rows = rows_of<Real>({{8000}, {6000}});
-    OrderStatisticsConfig<Real> original;
-    original.covariance = tracking::CovarianceBetas::original;
-    tracking::order_statistics<Real>(rows, original);
+    tracking::order_statistics<Real>(rows, config);
     DOUBLES_EQUAL(.12 / .52, weight(rows[1], 0), 1e-6);
     CHECK(rows[1].item[0].beta == constant<Real>(6, 10));
+}
+
+TEST(OrderStatistics, ExclusiveFormDropsWhatOthersClaimIfATrackHasItsOwn) {
+    // Ratios to missed 7, 2 and 3, 5: row 0 dominates measurement 0, row 1 measurement 1 (7 * 5 > 2 * 3).
+    auto rows = rows_of<double>({{7000, 2000}, {3000 * 10 / 9, 5000 * 10 / 9}});
+    tracking::order_statistics<double>(rows, OrderStatisticsConfig<double>{});
+    DOUBLES_EQUAL(.7 / .8, weight(rows[0], 0), 1e-12);
+    DOUBLES_EQUAL(0.0, weight(rows[0], 1), 0.0);
+    DOUBLES_EQUAL(0.0, weight(rows[1], 0), 0.0);
+    DOUBLES_EQUAL(weight(rows[1], 1), rows[1].item[1].beta, 0.0);  // decided: the covariance believes it
+}
+
+TEST(OrderStatistics, ExclusiveFormSharesSoftlyIfATrackHasNone) {
+    // The only measurement is row 0's; row 1 as in the soft form, and its covariance keeps the doubt.
+    auto rows = rows_of<double>({{8000}, {6000}});
+    tracking::order_statistics<double>(rows, OrderStatisticsConfig<double>{});
+    DOUBLES_EQUAL(.8, weight(rows[0], 0), 1e-12);
+    DOUBLES_EQUAL(.12 / .52, weight(rows[1], 0), 1e-12);
+    DOUBLES_EQUAL(.6, rows[1].item[0].beta, 1e-12);
 }
 
 TEST(OrderStatistics, EveryVariantLeavesProperRows) {
@@ -169,7 +191,7 @@ TEST(OrderStatistics, EveryVariantLeavesProperRows) {
     for (const auto precedence : {Precedence::index, Precedence::strength, Precedence::optimal}) {
         for (const auto missed : {MissedColumn::drop, MissedColumn::keep}) {
             for (const auto reduced : {Reduced::all_but_dominant, Reduced::claimed_by_others}) {
-                for (const auto reduction : {Reduction::divide, Reduction::soft}) {
+                for (const auto reduction : {Reduction::divide, Reduction::soft, Reduction::exclusive}) {
                     const OrderStatisticsConfig<Real> config{Real(4), precedence, missed,
                                                              reduced, reduction,  CovarianceBetas::original};
                     // More tracks than measurements, a row without doubt, an empty row.
