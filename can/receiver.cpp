@@ -1,5 +1,6 @@
 #include "can/receiver.hpp"
 
+#include <cstddef>
 #include <span>
 
 namespace can {
@@ -8,10 +9,9 @@ namespace {
 /// Bytes by identifier, 0 where we have no message.
 constexpr std::array<std::uint8_t, kIdCount> make_lengths() {
     std::array<std::uint8_t, kIdCount> lengths{};
-    for (std::uint16_t i = 0; i < kIdCount; ++i) {
-        const Message* message = find_message(static_cast<std::uint16_t>(kFirstId + i));
-        lengths[i] = message == nullptr ? std::uint8_t{0} : message->length;
-    }
+    for (const Message* message : kMessages)
+        for (int i = 0; i < message->count; ++i)
+            lengths[static_cast<std::size_t>(message->id - kFirstId + i)] = message->length;
     return lengths;
 }
 
