@@ -47,6 +47,7 @@ void Health::update(const CycleObservation& cycle) {
     set_if(cycle.internal_error, can::Fault::internal);
 
     const std::uint32_t losses = cycle.can.dropped + cycle.can.receive_overflow + cycle.can.bus_off;
+    if (cycles_ == 0) can_losses_ = losses;  // the port counts since power-on, health since start or restart
     set_if(losses != can_losses_ || cycle.can_state != hal::CanState::active, can::Fault::can_error);
     can_losses_ = losses;
 

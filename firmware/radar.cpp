@@ -43,6 +43,8 @@ void Radar::reset_state() {
     tracker_.configure(config_.tracker);
     collision_.reset();
     health_ = Health(config_.health);
+    // After a restart nothing may depend on what the bus said before: whoever sent the command starts anew too.
+    receiver_ = can::Receiver{};
     transmitter_ = {};
     warning_ = {};
     counters_ = {};

@@ -1,0 +1,134 @@
+/// The firmware on the PC beside a board that runs the same: given what the board was given, every byte must
+/// be equal.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "can/frame.hpp"
+#include "dsp/beat_frame.hpp"
+#include "firmware/radar.hpp"
+#include "hal/contract/beat_source.hpp"
+
+namespace sim {
+
+/// What one cycle of a radar depends on, apart from its own state.
+struct CycleInputs {
+    hal::BeatResult beat = hal::BeatResult::missing;
+    const dsp::BeatFrame* frame = nullptr;  ///< for BeatResult::ok
+    std::uint32_t sequence = 0;
+    bool overrun = false;                  ///< the cycle began late
+    std::span<const can::Frame> bus = {};  ///< received since the last cycle
+};
+
+/// A radar whose every input is given. Copies go their own ways.
+class FirmwareReplica {
+  public:
+    explicit FirmwareReplica(const firmware::RadarConfig& config);
+
+    /// What the radar sends in this cycle, in order.
+    std::vector<can::Frame> run(const CycleInputs& inputs);
+
+  private:
+    struct World;
+
+    std::shared_ptr<World> world_;  ///< of all copies: keeps nothing from one cycle to the next
+    firmware::Radar radar_;
+    std::uint64_t next_start_us_ = 0;
+};
+
+/// The judgement on what a board sent in one cycle.
+struct ListVerdict {
+    bool identical = false;
+    hal::BeatResult beat = hal::BeatResult::missing;  ///< what the board must have had for it
+    std::uint32_t sequence = 0;                       ///< for BeatResult::ok
+    bool overrun = false;
+    /// Of a list that is not identical: the first frame that differs, as it came and as it should have been.
+    std::string difference;
+};
+
+struct BoardTwinCounters {
+    std::uint64_t lists = 0;
+    std::uint64_t different = 0;
+    std::uint64_t can_frames = 0;
+    std::uint64_t processed = 0;    ///< beat frames that a list shows to have been processed
+    std::uint64_t passed_over = 0;  ///< beat frames sent before one that was processed, but not processed
+    std::uint64_t missing = 0;      ///< cycles without a beat frame
+    std::uint64_t invalid = 0;      ///< cycles in which a beat frame came damaged
+    std::uint64_t overruns = 0;
+};
+
+/// Takes what the PC sends to a board and what the board says on the bus, and judges cycle by cycle.
+///
+/// When a board looks at its inputs the bus does not tell: a beat frame or an ego motion that the PC sent at
+/// about the start of a cycle may belong to it or to the next. So each list is compared with what the replica
+/// says for every input the board can have had, the most likely first: frames are taken in the order they
+/// were sent, none can be taken twice, and what was taken shows in the counters. A list is identical if it
+/// equals one of these in every byte, and the replica goes on from there. A wrong byte cannot hide in this:
+/// CRC, counter and cycle of every frame follow from the state, and there is a handful of inputs against 2^64
+/// values of a frame.
+class BoardTwin {
+  public:
+    explicit BoardTwin(const firmware::RadarConfig& config);
+
+    /// The PC has sent a beat frame whole; / a CAN frame to the radar.
+    void beat_sent(std::uint32_t sequence, const dsp::BeatFrame& frame);
+    void bus_sent(const can::Frame& frame);
+
+    /// A frame from the board; those of other nodes are passed over. A verdict when it settles a list: when
+    /// it is the last frame of the list, or the first one that is wrong. What then still comes of a wrong
+    /// list is passed over.
+    std::optional<ListVerdict> receive(const can::Frame& frame);
+    /// Nothing has come for long, and nothing will: judges what there is of the current list.
+    std::optional<ListVerdict> give_up_list();
+
+    [[nodiscard]] const BoardTwinCounters& counters() const { return counters_; }
+    /// Beat frames sent and not yet accounted for.
+    [[nodiscard]] std::size_t outstanding() const { return beats_.size(); }
+
+  private:
+    /// Beat frames and CAN frames remembered at most: what is older the board will not look at any more.
+    static constexpr std::size_t kMaxBeats = 4;
+    static constexpr std::size_t kMaxBus = 16;
+
+    struct SentBeat {
+        std::uint32_t sequence;
+        dsp::BeatFrame frame;
+    };
+    /// Inputs the board can have had, and what follows from them.
+    struct Candidate {
+        hal::BeatResult beat;
+        std::size_t beat_index;  ///< into beats_, for BeatResult::ok
+        bool overrun;
+        std::size_t bus_count;  ///< of bus_, from the front
+        std::unique_ptr<FirmwareReplica> after;
+        std::vector<can::Frame> list;
+    };
+
+    [[nodiscard]] bool header_and_objects_there() const;
+    [[nodiscard]] std::vector<Candidate> possible_inputs() const;
+    void evaluate(Candidate& candidate) const;
+    std::optional<ListVerdict> judge(bool whole);
+    ListVerdict settle(Candidate& chosen, std::string difference);
+
+    std::unique_ptr<FirmwareReplica> replica_;
+    std::deque<SentBeat> beats_;
+    std::deque<can::Frame> bus_;
+    std::vector<can::Frame> list_;
+    std::vector<Candidate> candidates_;  ///< for list_; emptied when the inputs change
+    bool settled_ = true;                ///< nothing more is expected of list_
+    bool pass_over_rest_ = false;        ///< of list_, which has been reported already
+    std::uint8_t overruns_before_ = 0;   ///< as the last status said
+    BoardTwinCounters counters_;
+};
+
+/// "411#0102030405060708", as cansend takes it.
+std::string to_text(const can::Frame& frame);
+
+}  // namespace sim
