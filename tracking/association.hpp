@@ -55,4 +55,18 @@ void use_betas_as_weights(AssociationRow<S>& row) {
     row.missed_weight = row.missed;
 }
 
+/// What a sensor is like where a track is.
+template <class S>
+struct SensorLogs {
+    S detected = S(0);  ///< ln(PD / lambda)
+    S missed = S(0);    ///< ln(1 - PD PG)
+};
+
+/// What associators that rank measurements by signal strength want to know beyond a row.
+template <class S>
+struct RankInput {
+    S log_gate_clutter = S(0);  ///< ln(lambda V): clutter measurements expected in the gate
+    S log_spread = S(0);        ///< ln(1 + snr), the mean strength of the target against clutter
+};
+
 }  // namespace tracking

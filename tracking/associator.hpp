@@ -9,7 +9,13 @@
 #include <string_view>
 
 #include "tracking/association.hpp"
+#include "tracking/existence.hpp"
+#include "tracking/ihpda.hpp"
+#include "tracking/ijipda.hpp"
+#include "tracking/ipda.hpp"
+#include "tracking/jipda.hpp"
 #include "tracking/jpda.hpp"
+#include "tracking/lm_ipda.hpp"
 #include "tracking/nearest_neighbour.hpp"
 #include "tracking/order_statistics.hpp"
 #include "tracking/pda.hpp"
@@ -23,10 +29,27 @@ enum class Associator : std::uint8_t {
     ospda,   ///< order statistics over PDA
     jpda,    ///< joint probabilistic data association, exact
     osjpda,  ///< order statistics over JPDA
+    // Those below weigh every track by the probability that its target exists.
+    ipda,      ///< integrated PDA, each track for itself
+    lm_ipda,   ///< linear multi-target IPDA: the others' measurements are clutter
+    jipda,     ///< joint integrated PDA, exact
+    ijipda,    ///< iterative JIPDA, between IPDA and JIPDA by level
+    ihpda,     ///< integrated highest probability data association, each track for itself
+    jihpda,    ///< IHPDA with the optimal assignment
+    lm_ihpda,  ///< IHPDA with the linear multi-target betas and greedy assignment
+    imm_pdaf,  ///< interacting multiple models with PDA, each track for itself; done by the tracker
 };
 
 /// By the value of Associator.
-inline constexpr std::array<std::string_view, 5> kAssociatorNames{"nn", "pda", "ospda", "jpda", "osjpda"};
+inline constexpr std::array<std::string_view, 13> kAssociatorNames{
+    "nn",    "pda",    "ospda", "jpda",   "osjpda",   "ipda",    "lm-ipda",
+    "jipda", "ijipda", "ihpda", "jihpda", "lm-ihpda", "imm-pdaf"};
+inline constexpr auto kLastAssociator = static_cast<Associator>(kAssociatorNames.size() - 1);
+
+/// Needs signal strengths and RankInput.
+constexpr bool uses_rank(Associator a) {
+    return a == Associator::ihpda || a == Associator::jihpda || a == Associator::lm_ihpda;
+}
 
 constexpr std::string_view name_of(Associator a) {
     return kAssociatorNames[static_cast<std::size_t>(a)];
@@ -39,7 +62,30 @@ constexpr std::optional<Associator> associator_named(std::string_view name) {
     return std::nullopt;
 }
 
-/// From log ratios to betas, weights and evidence of all rows. `work` is touched by jpda and osjpda only.
+/// As on a command line: a name, and for ijipda the level after a colon, `ijipda:2`.
+struct AssociatorChoice {
+    Associator associator = Associator::ospda;
+    std::optional<int> level;
+};
+constexpr std::optional<AssociatorChoice> associator_chosen(std::string_view text) {
+    const std::size_t colon = text.find(':');
+    const std::optional<Associator> associator = associator_named(text.substr(0, colon));
+    if (!associator) return std::nullopt;
+    if (colon == std::string_view::npos) return AssociatorChoice{*associator, std::nullopt};
+    if (*associator != Associator::ijipda) return std::nullopt;
+    int level = 0;
+    const std::string_view digits = text.substr(colon + 1);
+    if (digits.empty() || digits.size() > 2) return std::nullopt;
+    for (const char c : digits) {
+        if (c < '0' || c > '9') return std::nullopt;
+        level = 10 * level + (c - '0');
+    }
+    if (level > kMaxLevel) return std::nullopt;
+    return AssociatorChoice{*associator, level};
+}
+
+/// From log ratios to betas, weights and evidence of all rows, of the associators that need no existence.
+/// `work` is touched by jpda and osjpda only.
 template <class S>
 JpdaStatus associate(std::span<AssociationRow<S>> rows, Associator associator,
                      const OrderStatisticsConfig<S>& order, JpdaWorkspace<S>& work) {
@@ -61,6 +107,70 @@ JpdaStatus associate(std::span<AssociationRow<S>> rows, Associator associator,
             status = jpda(rows, work);
             order_statistics(rows, order);
             break;
+        default:
+            break;
+    }
+    return status;
+}
+
+/// What the rows alone do not say.
+template <class S>
+struct AssociationInput {
+    std::span<S> existence;              ///< one a row; predicted, becomes updated
+    std::span<const S> strength;         ///< one a measurement, if uses_rank()
+    std::span<const RankInput<S>> rank;  ///< one a row, if uses_rank()
+};
+
+/// Scratch memory of associate(), sizeof(AssociatorWorkspace<dsp::Real>) = 34 KiB, static on the targets.
+template <class S>
+struct AssociatorWorkspace {
+    JpdaWorkspace<S> jpda;
+    IjipdaWorkspace<S> ijipda;
+    IhpdaWorkspace<S> ihpda;
+};
+
+struct AssociationStatus {
+    int approximated = 0;  ///< clusters too large for exact JPDA or JIPDA
+    int limited = 0;       ///< rows that did not reach the level of iterative JIPDA asked for
+};
+
+/// From log ratios to betas and weights of all rows, and their existence. Any associator; imm_pdaf is PDA
+/// here.
+template <class S>
+AssociationStatus associate(std::span<AssociationRow<S>> rows, const AssociationInput<S>& input,
+                            Associator associator, const OrderStatisticsConfig<S>& order,
+                            const IjipdaConfig& iterative, AssociatorWorkspace<S>& work) {
+    AssociationStatus status;
+    switch (associator) {
+        case Associator::ipda:
+        case Associator::imm_pdaf:
+            ipda(rows, input.existence);
+            break;
+        case Associator::lm_ipda:
+            lm_ipda(rows, input.existence, work.ihpda.linear);
+            break;
+        case Associator::jipda:
+            status.approximated = jipda(rows, input.existence, work.jpda).approximated;
+            break;
+        case Associator::ijipda:
+            status.limited = ijipda(rows, input.existence, iterative, work.ijipda).limited;
+            break;
+        case Associator::ihpda:
+            ihpda(rows, input.existence, input.strength, input.rank, {.sharing = Sharing::ignored},
+                  work.ihpda);
+            break;
+        case Associator::jihpda:
+            ihpda(rows, input.existence, input.strength, input.rank, {.sharing = Sharing::optimal},
+                  work.ihpda);
+            break;
+        case Associator::lm_ihpda:
+            ihpda(rows, input.existence, input.strength, input.rank,
+                  {.sharing = Sharing::greedy, .modulated = true}, work.ihpda);
+            break;
+        default:
+            status.approximated = associate(rows, associator, order, work.jpda).approximated;
+            for (std::size_t t = 0; t < rows.size(); ++t)
+                input.existence[t] = updated_existence(input.existence[t], rows[t].log_evidence);
     }
     return status;
 }

@@ -73,6 +73,18 @@ ObservableExistence<S> update_observable(const ObservableExistence<S>& predicted
     return {seen, share_of<S>(hidden, weight_of(unseen_before))};
 }
 
+/// psi L / (1 - psi + psi L) from ln L. L may be e^+-30, so whichever of L and 1/L is small is used.
+template <class S>
+S updated_existence(S psi, S log_evidence) {
+    const S doubt = S(1) - psi;
+    if (log_evidence > S(0)) {
+        const S against = doubt * exp(-log_evidence);
+        return psi * reciprocal(S(psi + against));
+    }
+    const S in_favour = psi * exp(log_evidence);
+    return in_favour * reciprocal(S(in_favour + doubt));
+}
+
 namespace detail {
 
 /// Turns likelihoods relative to "all clutter" into the row's probabilities, all conditional on existence,

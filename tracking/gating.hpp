@@ -108,7 +108,7 @@ class Gate {
     /// than kMaxGated the likeliest are kept. Betas are left to a solver.
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
               std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured) const {
-        const Logs& logs = obscured ? obscured_ : seen_;
+        const SensorLogs<S>& logs = sensor(obscured);
         row.count = 0;
         row.dropped = 0;
         row.obscured = obscured;
@@ -124,22 +124,37 @@ class Gate {
         }
     }
 
+    /// The gate of a filled row for the rank-based associators: clutter expected in it, at the accuracy of
+    /// its first measurement, and the target's strength. ln V = ln(g^2 / 2) - ln N(0; 0, S), since V = pi g^2
+    /// sqrt|S|.
+    [[nodiscard]] RankInput<S> rank_input(const AssociationRow<S>& row, const Track<S>& track,
+                                          std::span<const Measurement<S>> measurements) const {
+        constexpr auto kNepersPerDecibel = constant<S>(230'258'509, 1'000'000'000);
+        const S snr = track.snr_db * kNepersPerDecibel;
+        RankInput<S> out;
+        out.log_spread = snr > S(0) ? snr + ln(S(S(1) + exp(-snr))) : ln(S(S(1) + exp(snr)));
+        if (row.count == 0) return out;
+        const Ldl<S> s(innovation_covariance(track.covariance,
+                                             noise(measurements[row.item[0].measurement], row.obscured)));
+        out.log_gate_clutter = floored_ln(config_.clutter_density) + ln(S(config_.gate * constant<S>(1, 2))) -
+                               s.log_density(S(0));
+        return out;
+    }
+
+    /// ln(PD / lambda) and ln(1 - PD PG).
+    [[nodiscard]] const SensorLogs<S>& sensor(bool obscured) const { return obscured ? obscured_ : seen_; }
+
     [[nodiscard]] const GateConfig<S>& config() const { return config_; }
 
   private:
     static constexpr int kMaxFolds = 3;
-
-    struct Logs {
-        S detected;  // ln(PD / lambda)
-        S missed;    // ln(1 - PD PG)
-    };
 
     /// ln of a number of at least 2^-22: a certainty stays finite, so that comparing certainties works.
     static S floored_ln(S v) {
         const S least = constant<S>(1, std::int64_t{1} << 22);
         return ln(v < least ? least : v);
     }
-    [[nodiscard]] Logs logs(S detection_probability) const {
+    [[nodiscard]] SensorLogs<S> logs(S detection_probability) const {
         return {floored_ln(detection_probability) - floored_ln(config_.clutter_density),
                 floored_ln(S(1) - detection_probability * gate_probability_)};
     }
@@ -163,8 +178,8 @@ class Gate {
     Vec2<S> least_variance_;
     Vec2<S> obscured_variance_;
     S gate_probability_;
-    Logs seen_;
-    Logs obscured_;
+    SensorLogs<S> seen_;
+    SensorLogs<S> obscured_;
 };
 
 }  // namespace tracking

@@ -33,13 +33,6 @@ struct IhpdaConfig {
     bool by_existence = true;
 };
 
-/// What IHPDA wants to know of a row's gate beyond the row.
-template <class S>
-struct RankInput {
-    S log_gate_clutter = S(0);  ///< ln(lambda V): clutter measurements expected in the gate
-    S log_spread = S(0);        ///< ln(1 + snr), the mean strength of the target against clutter
-};
-
 /// P(the target has rank l | m measurements, one of them the target) for l = 1..m, strongest first; out has
 /// m. Exponential strengths, the target's mean 1 + snr times the clutter's. Sums to 1. Cost 2m
 /// multiplications and divisions.

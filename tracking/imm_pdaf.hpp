@@ -17,13 +17,6 @@ struct GatedMeasurement {
     Vec2<S> variance;
 };
 
-/// What a sensor is like where the track is.
-template <class S>
-struct SensorLogs {
-    S detected = S(0);  ///< ln(PD / lambda)
-    S missed = S(0);    ///< ln(1 - PD PG)
-};
-
 /// One sensor's frame: each mode makes its own PDA update with the same measurements, its likelihood
 ///     L_j = 1 - q + PD sum_i N(nu_ij; 0, S_j) / lambda
 /// moves the mode's probability, and existence follows from sum_j c_j L_j. Several sensors update one after

@@ -14,6 +14,7 @@
 #include "tracking/association.hpp"
 #include "tracking/associator.hpp"
 #include "tracking/gating.hpp"
+#include "tracking/imm_pdaf.hpp"
 #include "tracking/kalman.hpp"
 #include "tracking/order_statistics.hpp"
 #include "tracking/pda.hpp"
@@ -30,6 +31,8 @@ struct TrackerConfig {
     GateConfig<S> gate;
     Associator associator = Associator::ospda;
     OrderStatisticsConfig<S> order_statistics;
+    IjipdaConfig ijipda;  ///< of Associator::ijipda
+    RadarModes<S> modes;  ///< of Associator::imm_pdaf, in place of motion
 
     /// Two targets nearer than this in range and in range rate may be one detection: about two cells each,
     /// and a margin for the doubt about where a track hidden by another is.
@@ -57,13 +60,14 @@ struct TrackerConfig {
     S replace_margin_db = S(3);      ///< by how much stronger a track must be to take a confirmed one's place
 
     [[nodiscard]] constexpr bool valid() const {
-        return motion.valid() && gate.valid() && order_statistics.valid() &&
-               associator <= Associator::osjpda && resolution_range_m >= S(0) &&
-               resolution_rate_mps >= S(0) && min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) &&
-               initial_existence > S(0) && initial_existence < S(1) && survival > S(0) && survival <= S(1) &&
-               delete_existence > S(0) && delete_existence < initial_existence &&
-               confirm_existence > initial_existence && confirm_existence < S(1) && confirm_hits >= 2 &&
-               max_misses >= 1 && merge_distance2 >= S(0) && merge_frames >= 1 && replace_margin_db >= S(0);
+        return motion.valid() && gate.valid() && order_statistics.valid() && associator <= kLastAssociator &&
+               ijipda.valid() && modes.valid() && modes.period_s == motion.period_s &&
+               resolution_range_m >= S(0) && resolution_rate_mps >= S(0) &&
+               min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) && initial_existence > S(0) &&
+               initial_existence < S(1) && survival > S(0) && survival <= S(1) && delete_existence > S(0) &&
+               delete_existence < initial_existence && confirm_existence > initial_existence &&
+               confirm_existence < S(1) && confirm_hits >= 2 && max_misses >= 1 && merge_distance2 >= S(0) &&
+               merge_frames >= 1 && replace_margin_db >= S(0);
     }
 };
 
@@ -79,6 +83,7 @@ struct TrackerReport {
     int invalid_measurements = 0;  ///< not finite, or a variance that is not positive
     int gate_overflow = 0;         ///< measurements in a gate beyond kMaxGated
     int approximated = 0;          ///< clusters too large for exact JPDA
+    int limited = 0;               ///< tracks that did not reach the level of iterative JIPDA asked for
 };
 
 /// All memory is inside the object (kMaxConfirmed association rows are most of it). A step is bounded:
@@ -87,7 +92,8 @@ struct TrackerReport {
 template <class S>
 class Tracker {
   public:
-    explicit Tracker(const TrackerConfig<S>& config) : config_(config), gate_(config.gate) {}
+    explicit Tracker(const TrackerConfig<S>& config)
+        : config_(config), gate_(config.gate), model_(config.modes.model()) {}
 
     /// One frame, one period after the last. Of more than kMaxMeasurements the first are used: give them
     /// strongest first.
@@ -110,11 +116,15 @@ class Tracker {
     void configure(const TrackerConfig<S>& config) {
         config_ = config;
         gate_ = Gate<S>(config.gate);
+        model_ = config.modes.model();
         reset();
     }
 
     /// From the next frame on; tracks are kept.
-    void set_associator(Associator associator) { config_.associator = associator; }
+    void set_associator(Associator associator) {
+        config_.associator = associator;
+        for (std::size_t i = 0; i < live().size(); ++i) modes_[i].start(track_[i].x, track_[i].covariance);
+    }
 
     [[nodiscard]] const TrackerConfig<S>& config() const { return config_; }
 
@@ -138,6 +148,8 @@ class Tracker {
     [[nodiscard]] bool obscured(const Track<S>& track) const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
                                        std::uint64_t usable, TrackerReport& report);
+    void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S& existence,
+                         std::span<const Measurement<S>> measurements);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
     bool best_start(const Measurement<S>& from, const Measurement<S>& to, S& distance2,
@@ -155,7 +167,9 @@ class Tracker {
     Gate<S> gate_;
     std::array<Track<S>, kMaxTracks> track_{};
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
-    JpdaWorkspace<S> work_{};
+    AssociatorWorkspace<S> work_{};
+    ImmModel<S, 2, 2> model_;
+    std::array<ImmState<S, 2, 2>, kMaxTracks> modes_{};       // of track_, in the same order
     std::array<Measurement<S>, kMaxMeasurements> pending_{};  // unclaimed measurements of the last frame
     int count_ = 0;
     int pending_count_ = 0;
@@ -191,9 +205,17 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
 
 template <class S>
 void Tracker<S>::predict() {
-    for (Track<S>& t : live()) {
-        t.x = predict_state(t.x, config_.motion);
-        t.covariance = predict_covariance(t.covariance, config_.motion);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        Track<S>& t = track_[i];
+        if (config_.associator == Associator::imm_pdaf) {
+            tracking::predict(modes_[i], model_);
+            const Estimate<S, 2> all = combined(modes_[i]);
+            t.x = all.x;
+            t.covariance = all.covariance;
+        } else {
+            t.x = predict_state(t.x, config_.motion);
+            t.covariance = predict_covariance(t.covariance, config_.motion);
+        }
         t.existence *= config_.survival;
         if (t.age < 0xFFFF) ++t.age;
     }
@@ -215,20 +237,37 @@ bool Tracker<S>::obscured(const Track<S>& track) const {
 template <class S>
 std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
                                                std::uint64_t usable, TrackerReport& report) {
+    std::array<S, kMaxConfirmed> existence;
+    std::array<RankInput<S>, kMaxConfirmed> rank;
+    std::array<S, kMaxMeasurements> strength;
+    for (std::size_t i = 0; i < measurements.size(); ++i) strength[i] = measurements[i].snr_db;
     std::size_t rows = 0;
-    for (const Track<S>& t : tracks()) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        const Track<S>& t = track_[i];
         if (t.is_confirmed() != confirmed) continue;
-        AssociationRow<S>& row = row_[rows++];
+        AssociationRow<S>& row = row_[rows];
         gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t));
         report.gate_overflow += row.dropped;
+        existence[rows] = t.existence;
+        if (config_.associator == Associator::imm_pdaf)
+            associate_modes(modes_[i], t.x, row, existence[rows], measurements);
+        if (uses_rank(config_.associator)) rank[rows] = gate_.rank_input(row, t, measurements);
+        ++rows;
     }
-    const std::span<AssociationRow<S>> all(row_.data(), rows);
-    report.approximated += associate(all, config_.associator, config_.order_statistics, work_).approximated;
+    if (config_.associator != Associator::imm_pdaf) {
+        const AssociationStatus status = associate<S>(
+            {row_.data(), rows},
+            {{existence.data(), rows}, {strength.data(), measurements.size()}, {rank.data(), rows}},
+            config_.associator, config_.order_statistics, config_.ijipda, work_);
+        report.approximated += status.approximated;
+        report.limited += status.limited;
+    }
 
     std::array<S, kMaxMeasurements> share{};
     rows = 0;
     for (Track<S>& t : live()) {
         if (t.is_confirmed() != confirmed) continue;
+        t.existence = existence[rows];
         const AssociationRow<S>& row = row_[rows++];
         for (const Candidate<S>& c : row.candidates()) share[c.measurement] += c.weight;
         update(t, row, measurements);
@@ -240,20 +279,33 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
     return claimed;
 }
 
+/// The gate is about the combined prediction x, so all modes are judged on the same measurements, unfolded
+/// alike.
+template <class S>
+void Tracker<S>::associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row,
+                                 S& existence, std::span<const Measurement<S>> measurements) {
+    std::array<GatedMeasurement<S>, kMaxGated> gated;
+    std::array<S, kMaxGated> beta;
+    const auto count = static_cast<std::size_t>(row.count);
+    for (std::size_t c = 0; c < count; ++c) {
+        const Measurement<S>& m = measurements[row.item[c].measurement];
+        const Vec2<S> nu = gate_.innovation(x, m.z);
+        gated[c] = {{x[0] + nu[0], x[1] + nu[1]}, gate_.noise(m, row.obscured)};
+    }
+    row.missed = row.missed_weight = pda_update<S, 2, 2>(modes, existence, {gated.data(), count},
+                                                         gate_.sensor(row.obscured), {beta.data(), count});
+    for (std::size_t c = 0; c < count; ++c) row.item[c].beta = row.item[c].weight = beta[c];
+}
+
 template <class S>
 void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
                         std::span<const Measurement<S>> measurements) {
-    update_with_row(track.x, track.covariance, row, measurements, gate_);
-
-    // psi <- L psi / (1 - psi + L psi), L the evidence; L may be e^+-30, so whichever of L and 1/L is small
-    // is used.
-    const S doubt = S(1) - track.existence;
-    if (row.log_evidence > S(0)) {
-        const S against = doubt * exp(-row.log_evidence);
-        track.existence = track.existence * reciprocal(S(track.existence + against));
+    if (config_.associator == Associator::imm_pdaf) {
+        const Estimate<S, 2> all = combined(modes_[static_cast<std::size_t>(&track - track_.data())]);
+        track.x = all.x;
+        track.covariance = all.covariance;
     } else {
-        const S in_favour = track.existence * exp(row.log_evidence);
-        track.existence = in_favour * reciprocal(S(in_favour + doubt));
+        update_with_row(track.x, track.covariance, row, measurements, gate_);
     }
 
     track.measured = row.missed_weight < constant<S>(1, 2);
@@ -340,6 +392,7 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         best.age = 1;
         best.hits = 2;
         best.measured = true;
+        modes_[static_cast<std::size_t>(count_)].start(best.x, best.covariance);
         track_[static_cast<std::size_t>(count_++)] = best;
         ++report.initiated;
     }
@@ -458,7 +511,10 @@ void Tracker<S>::erase_free() {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         if (track_[i].state == TrackState::free) continue;
-        if (kept != i) track_[kept] = track_[i];
+        if (kept != i) {
+            track_[kept] = track_[i];
+            modes_[kept] = modes_[i];
+        }
         ++kept;
     }
     count_ = static_cast<int>(kept);
