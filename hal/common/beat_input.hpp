@@ -1,0 +1,66 @@
+/// The beat source of a board: the ring the front end's DMA fills, which a serial line can fill in its place.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+
+#include "hal/common/beat_link.hpp"
+#include "hal/common/frame_ring.hpp"
+#include "hal/contract/beat_source.hpp"
+
+namespace hal {
+
+/// One end of a serial line: `read` gives the next byte, 0 to 255, or -1 when none waits.
+template <class T>
+concept ByteInput = requires(T input) {
+    { input.read() } -> std::same_as<int>;
+};
+
+/// `Input` and `Timer` are the board's concrete classes: their calls are direct, so that no virtual function of an
+/// image calls another one and its call graph provably has no cycle.
+template <ByteInput Input, class Timer>
+class BeatInput final : public BeatSource {
+  public:
+    BeatInput(RingMemory& memory, Input& input, Timer& timer, std::uint32_t period_us)
+        : ring_(memory), input_(input), timer_(timer), period_us_(period_us) {}
+
+    /// Waits for at most a period from the call. `invalid`: nothing but broken packets, torn frames or stale stamps.
+    BeatResult acquire(dsp::BeatFrame& frame, std::uint32_t& sequence) override {
+        const std::uint64_t deadline_us = timer_.now_us() + period_us_;
+        const std::uint32_t broken_before = broken();
+        do {
+            receive();
+            if (ring_.take(frame, sequence) == RingResult::taken) return BeatResult::ok;
+        } while (timer_.now_us() < deadline_us);
+        return broken() != broken_before ? BeatResult::invalid : BeatResult::missing;
+    }
+
+    [[nodiscard]] const RingCounters& ring_counters() const { return ring_.counters(); }
+    [[nodiscard]] const BeatLinkCounters& link_counters() const { return link_.counters(); }
+
+  private:
+    /// Empties the serial line as far as the next complete frame.
+    void receive() {
+        for (std::size_t i = 0; i < kBeatPacketBytes; ++i) {
+            const int byte = input_.read();
+            if (byte < 0) return;
+            if (!link_.push(static_cast<std::uint8_t>(byte))) continue;
+            if (!ring_.publish(link_.frame(), link_.sequence())) ++unstampable_;
+            return;
+        }
+    }
+
+    [[nodiscard]] std::uint32_t broken() const {
+        return link_.counters().crc_errors + ring_.counters().torn + ring_.counters().stale + unstampable_;
+    }
+
+    FrameRing ring_;
+    BeatLinkReceiver link_;
+    Input& input_;
+    Timer& timer_;
+    std::uint32_t period_us_;
+    std::uint32_t unstampable_ = 0;
+};
+
+}  // namespace hal

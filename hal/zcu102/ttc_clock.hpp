@@ -1,0 +1,68 @@
+/// Time from a triple timer counter (TTC).
+#pragma once
+
+#include <cstdint>
+
+#include "hal/common/mmio.hpp"
+#include "hal/contract/clock.hpp"
+#include "hal/zcu102/registers.hpp"
+
+namespace hal::zcu102 {
+
+struct TtcConfig {
+    std::uint32_t reference_hz = kReferenceHz;  ///< LPD_LSBUS_CLK
+    /// The reference clock is divided by 2^prescaler_log2. 8: a count is 2.56 us, far below what a period needs, and a
+    /// counter of 16 bits, as the emulator has, turns over in 126 ms, which is longer than a period; the board's 32 bits
+    /// last three hours. (The emulator with -icount also needs a prescaler: without one it can hang.)
+    std::uint32_t prescaler_log2 = 8;
+
+    [[nodiscard]] constexpr bool valid() const {
+        return reference_hz >= 1'000'000 && prescaler_log2 >= 1 && prescaler_log2 <= 16;
+    }
+};
+static_assert(TtcConfig{}.valid());
+
+/// The counter runs freely and is extended to 64 bits at each look, so it must be looked at once a turn; the period is
+/// waited for by looking. Microseconds are derived from the count since start, never added up: no drift.
+template <RegisterBlock Registers>
+class TtcClock final : public Clock {
+  public:
+    TtcClock(Registers registers, const TtcConfig& config) : registers_(registers), config_(config) {}
+
+    /// Sets timer 1 going. The counter's width is what the interval register keeps: 32 bits in the Zynq UltraScale+, 16
+    /// in its emulator.
+    void start() {
+        using namespace ttc_reg;
+        registers_.write(kInterruptEnable, 0);
+        registers_.write(kClockControl, kClockPsEn | (config_.prescaler_log2 - 1) << kClockPsValShift);
+        registers_.write(kIntervalCounter, 0xFFFF'FFFF);
+        mask_ = registers_.read(kIntervalCounter);
+        registers_.write(kCounterControl, kCounterInt | kCounterRst | kCounterWaveDisable);
+        last_ = registers_.read(kCounterValue) & mask_;
+        count_ = 0;
+    }
+
+    std::uint64_t now_us() override {
+        const std::uint32_t value = registers_.read(ttc_reg::kCounterValue) & mask_;
+        count_ += (value - last_) & mask_;
+        last_ = value;
+        // counts * 2^prescaler / reference_hz, in an order that cannot overflow before the year 5000.
+        const std::uint64_t whole_s = (count_ << config_.prescaler_log2) / config_.reference_hz;
+        const std::uint64_t rest = (count_ << config_.prescaler_log2) % config_.reference_hz;
+        return whole_s * 1'000'000 + rest * 1'000'000 / config_.reference_hz;
+    }
+
+    void wait_until(std::uint64_t time_us) override {
+        while (now_us() < time_us) {
+        }
+    }
+
+  private:
+    Registers registers_;
+    TtcConfig config_;
+    std::uint32_t mask_ = 0xFFFF;
+    std::uint32_t last_ = 0;
+    std::uint64_t count_ = 0;
+};
+
+}  // namespace hal::zcu102
