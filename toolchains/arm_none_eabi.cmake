@@ -18,6 +18,7 @@ string(JOIN " " CMAKE_CXX_FLAGS_INIT ${RADAR_CPU_FLAGS} -mfloat-abi=soft -ffunct
        -fno-rtti -fno-threadsafe-statics -fno-unwind-tables -fno-asynchronous-unwind-tables -fno-common -fstack-usage
        -DEIGEN_NO_MALLOC -DEIGEN_NO_DEBUG -DEIGEN_NO_IO -DEIGEN_DONT_VECTORIZE)
 set(CMAKE_CXX_FLAGS_RELEASE_INIT "-O2 -DNDEBUG")
+string(JOIN " " CMAKE_ASM_FLAGS_INIT ${RADAR_CPU_FLAGS} -mfloat-abi=soft)
 # Start-up code and the memory map are ours; of the libraries only what is referenced comes in (memcpy, 64-bit division).
 string(JOIN " " CMAKE_EXE_LINKER_FLAGS_INIT ${RADAR_CPU_FLAGS} -mfloat-abi=soft -nostartfiles --specs=nano.specs
        -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--no-warn-rwx-segments)

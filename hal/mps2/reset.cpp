@@ -1,6 +1,6 @@
-#include "hal/common/reset_record.hpp"
+#include "hal/bare_metal/reset_record.hpp"
 
-#include "hal/common/startup.hpp"
+#include "hal/bare_metal/startup.hpp"
 #include "hal/mps2/system_control.hpp"
 
 namespace hal {

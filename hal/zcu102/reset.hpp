@@ -1,7 +1,7 @@
 /// Why the board was reset.
 #pragma once
 
-#include "hal/common/reset_record.hpp"
+#include "hal/bare_metal/reset_record.hpp"
 
 namespace hal::zcu102 {
 

@@ -33,26 +33,26 @@ reset_handler:
 /* Each: cause (hal::ResetCause) in r0, the address of the culprit in r1, on a stack of its own. They do not return. */
     .section .text.fault_handlers, "ax"
 undefined_handler:
-    mov r0, #4
+    mov r0, #3
     mrs r2, spsr
     tst r2, #0x20                   /* Thumb? */
     subne r1, lr, #2
     subeq r1, lr, #4
     b   enter_fault
 supervisor_handler:
-    mov r0, #5
+    mov r0, #4
     sub r1, lr, #4
     b   enter_fault
 prefetch_handler:
-    mov r0, #6
+    mov r0, #5
     sub r1, lr, #4
     b   enter_fault
 data_handler:
-    mov r0, #7
+    mov r0, #6
     sub r1, lr, #8
     b   enter_fault
 interrupt_handler:
-    mov r0, #9
+    mov r0, #8
     sub r1, lr, #4
 enter_fault:
     cpsid if, #0x13

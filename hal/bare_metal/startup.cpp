@@ -1,8 +1,8 @@
-#include "hal/common/startup.hpp"
+#include "hal/bare_metal/startup.hpp"
 
 #include <cstddef>
 
-#include "hal/common/reset_record.hpp"
+#include "hal/bare_metal/reset_record.hpp"
 
 // Set by the linker script; only their addresses mean something.
 extern "C" {

@@ -11,14 +11,13 @@ enum class ResetCause : std::uint8_t {
     power_on = 0,  ///< no record: the memory had lost its contents
     external = 1,  ///< a reset from outside while the program ran: button, debugger, supply dip
     watchdog = 2,
-    restart = 3,  ///< asked for by a command
-    undefined_instruction = 4,
-    supervisor_call = 5,
-    prefetch_abort = 6,
-    data_abort = 7,
-    hard_fault = 8,
-    unexpected_interrupt = 9,
-    aborted = 10,  ///< abort, pure virtual call, or main returned
+    undefined_instruction = 3,
+    supervisor_call = 4,
+    prefetch_abort = 5,
+    data_abort = 6,
+    hard_fault = 7,
+    unexpected_interrupt = 8,
+    aborted = 9,  ///< abort, pure virtual call, or main returned
 };
 
 std::string_view to_string(ResetCause cause);

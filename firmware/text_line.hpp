@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace hal {
+namespace firmware {
 
 /// At most 160 characters; what does not fit is cut off at the end, which a reader sees.
 class TextLine {
@@ -42,4 +42,4 @@ class TextLine {
     std::size_t size_ = 0;
 };
 
-}  // namespace hal
+}  // namespace firmware

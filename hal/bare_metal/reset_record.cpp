@@ -1,4 +1,4 @@
-#include "hal/common/reset_record.hpp"
+#include "hal/bare_metal/reset_record.hpp"
 
 #include <array>
 
@@ -22,9 +22,9 @@ std::uint32_t check_word(const Stored& s) {
     return ~(s.magic ^ (s.cause << 1) ^ (s.pc << 2) ^ (s.status << 3) ^ (s.address << 4));
 }
 
-constexpr std::array<std::string_view, 11> kNames{
-    "power on",        "external reset", "watchdog",   "restart command",      "undefined instruction", "supervisor call",
-    "prefetch abort", "data abort",     "hard fault", "unexpected interrupt", "aborted"};
+constexpr std::array<std::string_view, 10> kNames{
+    "power on",   "external reset", "watchdog",   "undefined instruction", "supervisor call", "prefetch abort",
+    "data abort", "hard fault",     "unexpected interrupt", "aborted"};
 
 }  // namespace
 
