@@ -70,7 +70,7 @@ void doppler_transform(const RangeSpectra& spectra, const Window& window, int ra
         const std::int32_t im = z[d].im;
         const auto power = static_cast<std::uint32_t>(re * re) + static_cast<std::uint32_t>(im * im);
         const std::int32_t level = power == 0 ? 0 : log2_q10(power) + 2 * exponent * kLogOne;
-        log_power[d] = static_cast<std::uint16_t>(std::max(level, 0));
+        log_power[d] = static_cast<std::uint16_t>(std::max<std::int32_t>(level, 0));
     }
 }
 

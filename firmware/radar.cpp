@@ -220,7 +220,7 @@ void Radar::track_and_warn() {
         m.z = {d.range_m, d.range_rate_mps};
         m.variance = {d.range_variance_m2, d.rate_variance_m2ps2};
         m.snr_db = d.snr_db;
-        observation_.strongest_snr_cdb = std::max(observation_.strongest_snr_cdb, centi(d.snr_db));
+        observation_.strongest_snr_cdb = std::max<int>(observation_.strongest_snr_cdb, centi(d.snr_db));
     }
     const tracking::TrackerReport report =
         tracker_.step({measurements.data(), static_cast<std::size_t>(count)});

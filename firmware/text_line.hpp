@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -15,7 +16,10 @@ class TextLine {
         for (const char c : s) put(c);
         return *this;
     }
-    TextLine& number(std::uint64_t value) {
+    /// Not negative.
+    template <std::integral Int>
+    TextLine& number(Int v) {
+        auto value = static_cast<std::uint64_t>(v);
         std::array<char, 20> digits{};
         std::size_t n = 0;
         do {

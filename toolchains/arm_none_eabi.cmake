@@ -6,7 +6,7 @@ set(CMAKE_ASM_COMPILER arm-none-eabi-gcc)
 set(CMAKE_OBJDUMP arm-none-eabi-objdump)
 set(CMAKE_NM arm-none-eabi-nm)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
-set(CMAKE_EXECUTABLE_SUFFIX .elf)
+set(CMAKE_EXECUTABLE_SUFFIX_CXX .elf)
 
 # Header-only Debian packages (Eigen) are the same for every processor; programs and libraries are not.
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

@@ -1,4 +1,5 @@
 # Arm MPS2 with the FPGA image AN500: Cortex-M7.
 set(RADAR_BOARD mps2)
+set(RADAR_BOARD_NAME "MPS2 AN500, Cortex-M7")
 set(RADAR_CPU_FLAGS -mcpu=cortex-m7 -mthumb)
 include(${CMAKE_CURRENT_LIST_DIR}/arm_none_eabi.cmake)

@@ -23,8 +23,8 @@ std::uint32_t check_word(const Stored& s) {
 }
 
 constexpr std::array<std::string_view, 10> kNames{
-    "power on",   "external reset", "watchdog",   "undefined instruction", "supervisor call", "prefetch abort",
-    "data abort", "hard fault",     "unexpected interrupt", "aborted"};
+    "power on",       "external reset", "watchdog",   "undefined instruction", "supervisor call",
+    "prefetch abort", "data abort",     "hard fault", "unexpected interrupt",  "aborted"};
 
 }  // namespace
 

@@ -35,7 +35,8 @@ ResetRecord begin_reset_record();
 /// Leaves the record to the next run. Memory that start-up code does not touch holds it, with a check word.
 void write_reset_record(const ResetRecord& record);
 
-/// The board's: records why (in registers that survive more than its memory does, where there are some) and resets.
+/// The board's: records why (in registers that survive more than its memory does, where there are some) and
+/// resets.
 [[noreturn]] void reset_board(const ResetRecord& record);
 
 }  // namespace hal

@@ -18,17 +18,20 @@ namespace {
 
 constexpr std::uint32_t kStackPaint = 0x5AFE'57AC;
 
-[[noreturn]] void end_of_program() { hal::reset_board({.cause = hal::ResetCause::aborted}); }
+[[noreturn]] void end_of_program() {
+    hal::reset_board({.cause = hal::ResetCause::aborted});
+}
 
 }  // namespace
 
 namespace hal {
 
 void start_program() {
-    // Through volatile pointers: the compiler must not take the linker's symbols for single words, nor use memset,
-    // which could be spread over the stack that is being painted.
+    // Through volatile pointers: the compiler must not take the linker's symbols for single words, nor use
+    // memset, which could be spread over the stack that is being painted.
     const std::uintptr_t in_use = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) - 128;
-    for (volatile std::uint32_t* p = &_stack_bottom; reinterpret_cast<std::uintptr_t>(p) < in_use; ++p) *p = kStackPaint;
+    for (volatile std::uint32_t* p = &_stack_bottom; reinterpret_cast<std::uintptr_t>(p) < in_use; ++p)
+        *p = kStackPaint;
     const volatile std::uint32_t* from = &_data_load;
     for (volatile std::uint32_t* p = &_data_start; p < &_data_end; ++p) *p = *from++;
     for (volatile std::uint32_t* p = &_bss_start; p < &_bss_end; ++p) *p = 0;
@@ -51,11 +54,18 @@ MemoryUse memory_use() {
 
 }  // namespace hal
 
-// What the compiler and the C++ library may call when something that cannot happen does. Theirs print or throw.
+// What the compiler and the C++ library may call when something that cannot happen does. Theirs print or
+// throw.
 extern "C" {
-[[noreturn]] void abort() { end_of_program(); }
-[[noreturn]] void __cxa_pure_virtual() { end_of_program(); }
+[[noreturn]] void abort() {
+    end_of_program();
+}
+[[noreturn]] void __cxa_pure_virtual() {
+    end_of_program();
+}
 /// Objects of static storage are never destroyed: main does not return.
-int __cxa_atexit(void (*)(void*), void*, void*) { return 0; }
+int __cxa_atexit(void (*)(void*), void*, void*) {
+    return 0;
+}
 void* __dso_handle = nullptr;
 }

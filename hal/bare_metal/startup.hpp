@@ -15,7 +15,8 @@ struct MemoryUse {
 /// Walks over the part of the stack that was never used: a few thousand instructions.
 MemoryUse memory_use();
 
-/// Prepares memory, runs constructors, and calls main. Entered with the stack pointer at the top of the stack.
+/// Prepares memory, runs constructors, and calls main. Entered with the stack pointer at the top of the
+/// stack.
 extern "C" [[noreturn]] void start_program();
 
 }  // namespace hal

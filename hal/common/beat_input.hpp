@@ -17,17 +17,22 @@ concept ByteInput = requires(T input) {
     { input.read() } -> std::same_as<int>;
 };
 
-/// `Input` and `Timer` are the board's concrete classes: their calls are direct, so that no virtual function of an
-/// image calls another one and its call graph provably has no cycle.
+/// `Input` and `Timer` are the board's concrete classes: their calls are direct, so that no virtual function
+/// of an image calls another one and its call graph provably has no cycle.
 template <ByteInput Input, class Timer>
 class BeatInput final : public BeatSource {
   public:
     BeatInput(RingMemory& memory, Input& input, Timer& timer, std::uint32_t period_us)
         : ring_(memory), input_(input), timer_(timer), period_us_(period_us) {}
 
-    /// Waits for at most a period from the call. `invalid`: nothing but broken packets, torn frames or stale stamps.
+    /// Waits until a twentieth of a period before the period ends, so that a cycle without a frame is over in
+    /// time; the periods follow each other from the first call on. `invalid`: nothing but broken packets,
+    /// torn frames or stale stamps; what was torn is in `frame`.
     BeatResult acquire(dsp::BeatFrame& frame, std::uint32_t& sequence) override {
-        const std::uint64_t deadline_us = timer_.now_us() + period_us_;
+        const std::uint64_t now_us = timer_.now_us();
+        if (period_end_us_ == 0 || period_end_us_ > now_us + period_us_) period_end_us_ = now_us;
+        while (period_end_us_ <= now_us) period_end_us_ += period_us_;
+        const std::uint64_t deadline_us = period_end_us_ - period_us_ / 20;
         const std::uint32_t broken_before = broken();
         do {
             receive();
@@ -45,8 +50,8 @@ class BeatInput final : public BeatSource {
         for (std::size_t i = 0; i < kBeatPacketBytes; ++i) {
             const int byte = input_.read();
             if (byte < 0) return;
-            if (!link_.push(static_cast<std::uint8_t>(byte))) continue;
-            if (!ring_.publish(link_.frame(), link_.sequence())) ++unstampable_;
+            if (!link_.push(static_cast<std::uint8_t>(byte), ring_.open())) continue;
+            if (!ring_.close(link_.sequence())) ++unstampable_;
             return;
         }
     }
@@ -60,6 +65,7 @@ class BeatInput final : public BeatSource {
     Input& input_;
     Timer& timer_;
     std::uint32_t period_us_;
+    std::uint64_t period_end_us_ = 0;
     std::uint32_t unstampable_ = 0;
 };
 

@@ -7,7 +7,8 @@
 
 namespace hal {
 
-/// One side only puts, the other only gets, so neither needs to mask interrupts. Holds Capacity bytes, a power of two.
+/// One side only puts, the other only gets, so neither needs to mask interrupts. Holds Capacity bytes, a
+/// power of two.
 template <std::size_t Capacity>
 class ByteQueue {
     static_assert(Capacity > 0 && (Capacity & (Capacity - 1)) == 0);

@@ -62,13 +62,19 @@ RingResult FrameRing::take(dsp::BeatFrame& frame, std::uint32_t& sequence) {
     return RingResult::taken;
 }
 
-bool FrameRing::publish(const dsp::BeatFrame& frame, std::uint32_t sequence) {
+dsp::BeatFrame& FrameRing::open() {
+    RingSlot& slot = memory_[writing_];
+    if (slot.opened != 0) store(slot.opened, 0);
+    return slot.frame;
+}
+
+bool FrameRing::close(std::uint32_t sequence) {
     const std::uint32_t stamp = sequence + 1;
     if (stamp == 0) return false;
-    RingSlot& slot = memory_[stamp % 2];
+    RingSlot& slot = memory_[writing_];
     store(slot.opened, stamp);
-    std::memcpy(&slot.frame, &frame, sizeof frame);
     store(slot.closed, stamp);
+    writing_ = 1 - writing_;
     return true;
 }
 

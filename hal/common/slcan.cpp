@@ -14,7 +14,9 @@ int digit(char c) {
     return -1;
 }
 
-char hex(unsigned value) { return "0123456789ABCDEF"[value & 15U]; }
+char hex(unsigned value) {
+    return "0123456789ABCDEF"[value & 15U];
+}
 
 }  // namespace
 
@@ -49,7 +51,9 @@ SlcanEvent SlcanParser::answer_with(std::string_view text, SlcanEvent event) {
     return event;
 }
 
-SlcanEvent SlcanParser::refuse() { return answer_with(kBell, SlcanEvent::malformed); }
+SlcanEvent SlcanParser::refuse() {
+    return answer_with(kBell, SlcanEvent::malformed);
+}
 
 SlcanEvent SlcanParser::interpret() {
     if (size_ > line_.size()) return refuse();
@@ -77,11 +81,16 @@ SlcanEvent SlcanParser::interpret() {
         case 'Z':
             if (size_ != 2 || line_[1] != '0') return refuse();
             return answer_with(kOk);
-        case 't': return interpret_frame(3, true);
-        case 'r': return interpret_frame(3, false);
-        case 'T': return interpret_frame(8, true);
-        case 'R': return interpret_frame(8, false);
-        default: return refuse();
+        case 't':
+            return interpret_frame(3, true);
+        case 'r':
+            return interpret_frame(3, false);
+        case 'T':
+            return interpret_frame(8, true);
+        case 'R':
+            return interpret_frame(8, false);
+        default:
+            return refuse();
     }
 }
 

@@ -1,9 +1,11 @@
-/// CAN frames as text over a serial line, the Lawicel ASCII protocol ("SLCAN"), which Linux's slcand attaches as a SocketCAN
-/// interface. To the other end the board is a CAN adapter with one busy node on its bus: the radar.
+/// CAN frames as text over a serial line, the Lawicel ASCII protocol ("SLCAN"), which Linux's slcand attaches
+/// as a SocketCAN interface. To the other end the board is a CAN adapter with one busy node on its bus: the
+/// radar.
 ///
-/// Answered: `Sn` (bit rate, n 0 to 8), `O` open, `C` close, `tIIILDD..` (a frame for the radar), `TIIIIIIIILDD..`, `rIIIL`,
-/// `RIIIIIIIIL` (understood, not for us), `F` status, `V` version, `N` serial number, `Z0` no time stamps. Each command ends
-/// with CR and is answered with CR, or BEL when it was refused.
+/// Answered: `Sn` (bit rate, n 0 to 8), `O` open, `C` close, `tIIILDD..` (a frame for the radar),
+/// `TIIIIIIIILDD..`, `rIIIL`, `RIIIIIIIIL` (understood, not for us), `F` status, `V` version, `N` serial
+/// number, `Z0` no time stamps. Each command ends with CR and is answered with CR, or BEL when it was
+/// refused.
 #pragma once
 
 #include <array>
@@ -59,8 +61,9 @@ class SlcanParser {
     bool open_ = false;
 };
 
-/// The CAN port. `Serial`: `int read()`, `bool write(std::uint8_t)`, `bool overrun()`. Nothing is queued, so there is never an
-/// old list to discard: a frame is on the line when send() returns, 220 us later at 1 Mbaud.
+/// The CAN port. `Serial`: `int read()`, `bool write(std::uint8_t)`, `bool overrun()`. Nothing is queued, so
+/// there is never an old list to discard: a frame is on the line when send() returns, 220 us later at 1
+/// Mbaud.
 template <class Serial>
 class SlcanPort final : public CanPort {
   public:

@@ -8,8 +8,8 @@
 
 namespace hal {
 
-/// `Uart`: `int read()`, `bool write(std::uint8_t)`. When the line does not take a character, the rest of the text is
-/// given up: the console never holds the radar.
+/// `Uart`: `int read()`, `bool write(std::uint8_t)`. When the line does not take a character, the rest of the
+/// text is given up: the console never holds the radar.
 template <class Uart>
 class UartConsole final : public Console {
   public:

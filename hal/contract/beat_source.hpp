@@ -10,7 +10,7 @@ namespace hal {
 enum class BeatResult : std::uint8_t {
     ok,       ///< frame written
     missing,  ///< no new frame within the period; frame untouched
-    invalid,  ///< a frame came but was short, stale or corrupt; frame untouched
+    invalid,  ///< a frame came but was short, stale or corrupt; `frame` holds nothing of use
     ended,    ///< a recording or a scenario is over; there will be no more frames
 };
 

@@ -1,5 +1,6 @@
-/// Registers of the Arm MPS2 devices the radar uses, named as in the Cortex-M System Design Kit manual (DDI 0479) and the
-/// Armv7-M architecture manual; addresses and interrupts from the application notes AN386 and AN500.
+/// Registers of the Arm MPS2 devices the radar uses, named as in the Cortex-M System Design Kit manual (DDI
+/// 0479) and the Armv7-M architecture manual; addresses and interrupts from the application notes AN386 and
+/// AN500.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +38,8 @@ inline constexpr std::uint32_t kUnlock = 0x1ACC'E551;
 }  // namespace watchdog_reg
 
 namespace scs_reg {
-inline constexpr std::uint32_t kSystCsr = 0x010, kSystRvr = 0x014, kSystCvr = 0x018, kNvicIser0 = 0x100, kIcsr = 0xD04,
-                               kAircr = 0xD0C, kCcr = 0xD14, kCfsr = 0xD28, kBfar = 0xD38;
+inline constexpr std::uint32_t kSystCsr = 0x010, kSystRvr = 0x014, kSystCvr = 0x018, kNvicIser0 = 0x100,
+                               kIcsr = 0xD04, kAircr = 0xD0C, kCcr = 0xD14, kCfsr = 0xD28, kBfar = 0xD38;
 inline constexpr std::uint32_t kSystEnable = 1U << 0, kSystProcessorClock = 1U << 2;
 inline constexpr std::uint32_t kAircrSysresetreq = 0x05FA'0000 | 1U << 2;
 inline constexpr std::uint32_t kCcrDiv0Trap = 1U << 4;

@@ -27,9 +27,9 @@ extern "C" [[noreturn]] void record_fault(const ExceptionFrame* frame) {
     constexpr std::uint32_t kNmi = 2;
     constexpr std::uint32_t kFirstInterrupt = 16;
     const std::uint32_t exception = SystemControl::read(mps2::scs_reg::kIcsr) & 0x1FF;
-    ResetRecord record{.cause = exception == kNmi                ? ResetCause::watchdog
-                                : exception >= kFirstInterrupt   ? ResetCause::unexpected_interrupt
-                                                                 : ResetCause::hard_fault,
+    ResetRecord record{.cause = exception == kNmi              ? ResetCause::watchdog
+                                : exception >= kFirstInterrupt ? ResetCause::unexpected_interrupt
+                                                               : ResetCause::hard_fault,
                        .status = SystemControl::read(mps2::scs_reg::kCfsr),
                        .address = SystemControl::read(mps2::scs_reg::kBfar)};
     const auto at = reinterpret_cast<std::uintptr_t>(frame);

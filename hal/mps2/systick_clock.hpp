@@ -9,8 +9,9 @@
 
 namespace hal::mps2 {
 
-/// SysTick counts all its 24 bits down at the processor clock and is extended to 64 bits at each look, so it must be
-/// looked at once a turn, 0.67 s. Microseconds are derived from the count since start, never added up: no drift.
+/// SysTick counts all its 24 bits down at the processor clock and is extended to 64 bits at each look, so it
+/// must be looked at once a turn, 0.67 s. Microseconds are derived from the count since start, never added
+/// up: no drift.
 template <RegisterBlock SystemControl, RegisterBlock Timer>
 class SysTickClock final : public Clock {
   public:
@@ -65,8 +66,9 @@ class SysTickClock final : public Clock {
   private:
     static constexpr std::uint32_t kMask = 0x00FF'FFFF;
     static constexpr std::uint32_t kTicksPerUs = kClockHz / 1'000'000;
-    static constexpr std::uint32_t kLongestSleep = kMask / 2;  ///< SysTick must be looked at before it turned over
-    static constexpr std::uint32_t kShortestSleep = 100;       ///< below that, setting the alarm takes longer
+    static constexpr std::uint32_t kLongestSleep =
+        kMask / 2;                                        ///< SysTick must be looked at before it turned over
+    static constexpr std::uint32_t kShortestSleep = 100;  ///< below that, setting the alarm takes longer
     static_assert(kTicksPerUs * 1'000'000 == kClockHz);
 
     SystemControl system_;

@@ -1,4 +1,5 @@
-/// A CMSDK UART. It holds a single byte each way, so reception is by interrupt; transmission waits for the line.
+/// A CMSDK UART. It holds a single byte each way, so reception is by interrupt; transmission waits for the
+/// line.
 #pragma once
 
 #include <cstddef>
@@ -25,8 +26,8 @@ class Uart {
         registers_.write(kCtrl, kListening);
     }
 
-    /// The receive interrupt. When the queue is full the byte stays in the UART and the interrupt stays off until
-    /// read() made room; what the line brings meanwhile is an overrun.
+    /// The receive interrupt. When the queue is full the byte stays in the UART and the interrupt stays off
+    /// until read() made room; what the line brings meanwhile is an overrun.
     void on_receive() {
         using namespace uart_reg;
         registers_.write(kIntclear, kIntRx);

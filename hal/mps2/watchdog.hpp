@@ -10,8 +10,8 @@
 namespace hal::mps2 {
 
 struct WatchdogConfig {
-    /// Kick to NMI, where the cause is recorded; the reset follows after the same time again. Below two periods a single
-    /// slow cycle would reset; much longer and the car drives blind.
+    /// Kick to NMI, where the cause is recorded; the reset follows after the same time again. Below two
+    /// periods a single slow cycle would reset; much longer and the car drives blind.
     std::uint32_t timeout_ms = 200;
 
     [[nodiscard]] constexpr std::uint32_t load() const { return timeout_ms * (kClockHz / 1000); }

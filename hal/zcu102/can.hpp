@@ -26,13 +26,15 @@ struct BitTiming {
     [[nodiscard]] constexpr bool valid(std::uint32_t reference_hz, std::uint32_t bit_rate) const {
         return prescaler >= 1 && prescaler <= 256 && time_segment_1 >= 1 && time_segment_1 <= 16 &&
                time_segment_2 >= 2 && time_segment_2 <= 8 && jump_width >= 1 && jump_width <= 4 &&
-               jump_width <= time_segment_2 && quanta() >= 8 && prescaler * quanta() * bit_rate == reference_hz;
+               jump_width <= time_segment_2 && quanta() >= 8 &&
+               prescaler * quanta() * bit_rate == reference_hz;
     }
 };
 
-/// The exact timing whose sample point is nearest to the wanted one; the one with most quanta of several. An invalid
-/// one (all zero) when the clock cannot be divided to the bit rate.
-constexpr BitTiming bit_timing(std::uint32_t reference_hz, std::uint32_t bit_rate, std::uint32_t sample_permille) {
+/// The exact timing whose sample point is nearest to the wanted one; the one with most quanta of several. An
+/// invalid one (all zero) when the clock cannot be divided to the bit rate.
+constexpr BitTiming bit_timing(std::uint32_t reference_hz, std::uint32_t bit_rate,
+                               std::uint32_t sample_permille) {
     BitTiming best;
     std::uint32_t best_error = 1000;
     for (std::uint32_t prescaler = 1; prescaler <= 256; ++prescaler) {
@@ -58,11 +60,11 @@ struct CanConfig {
     std::uint32_t bit_rate = 500'000;           ///< bit/s, of the whole bus
     /// CiA 301 asks for 875; 100 MHz allows 850 with three quanta left behind the sample point.
     std::uint32_t sample_point_permille = 875;
-    /// Bus off to the next try, at least the 128 x 11 bit times of ISO 11898-1. Longer spares a broken bus, shorter
-    /// loses fewer lists.
+    /// Bus off to the next try, at least the 128 x 11 bit times of ISO 11898-1. Longer spares a broken bus,
+    /// shorter loses fewer lists.
     std::uint32_t recovery_us = 100'000;
-    /// How long begin_cycle waits for a gap between frames before it discards an old list; one frame of 8 bytes takes
-    /// up to 135 bit times, 270 us.
+    /// How long begin_cycle waits for a gap between frames before it discards an old list; one frame of 8
+    /// bytes takes up to 135 bit times, 270 us.
     std::uint32_t gap_us = 300;
     std::array<std::uint16_t, 2> accept{0x431, 0x432};  ///< identifiers we listen to: ego motion, command
 
@@ -71,8 +73,8 @@ struct CanConfig {
     }
     [[nodiscard]] constexpr bool valid() const {
         return timing().valid(reference_hz, bit_rate) &&
-               std::uint64_t{recovery_us} * bit_rate >= std::uint64_t{128 * 11} * 1'000'000 && gap_us <= 1000 &&
-               accept[0] < 0x800 && accept[1] < 0x800;
+               std::uint64_t{recovery_us} * bit_rate >= std::uint64_t{128 * 11} * 1'000'000 &&
+               gap_us <= 1000 && accept[0] < 0x800 && accept[1] < 0x800;
     }
 };
 inline constexpr CanConfig kDefaultCanConfig{};
@@ -92,8 +94,8 @@ class CanController final : public CanPort {
     CanController(Registers registers, Timer& timer, const CanConfig& config = kDefaultCanConfig)
         : registers_(registers), timer_(timer), config_(config) {}
 
-    /// Resets and programs the controller. False: it did not answer within kPatience reads; state() is then `down`, and
-    /// begin_cycle tries again after the recovery time.
+    /// Resets and programs the controller. False: it did not answer within kPatience reads; state() is then
+    /// `down`, and begin_cycle tries again after the recovery time.
     bool start() {
         using namespace can_reg;
         in_flight_ = 0;
@@ -149,9 +151,10 @@ class CanController final : public CanPort {
         return running_ && receive_from_fifo(frame);
     }
 
-    /// A list that is still under way when the next one is due is discarded as a whole: the controller does not tell
-    /// how much of it is through, so all of it counts as dropped. The FIFOs can only be emptied by a reset, before which
-    /// received frames are put aside and a gap on the bus is waited for, for gap_us at most.
+    /// A list that is still under way when the next one is due is discarded as a whole: the controller does
+    /// not tell how much of it is through, so all of it counts as dropped. The FIFOs can only be emptied by a
+    /// reset, before which received frames are put aside and a gap on the bus is waited for, for gap_us at
+    /// most.
     void begin_cycle() override {
         using namespace can_reg;
         look_for_bus_off();
@@ -179,7 +182,8 @@ class CanController final : public CanPort {
         if (bus_off_) return CanState::bus_off;
         const std::uint32_t status = registers_.read(kSr);
         if (!running_ || (status & kSrConfig) != 0) return CanState::down;
-        // Discarding an old list clears the controller's error counters; what they said before holds for the cycle.
+        // Discarding an old list clears the controller's error counters; what they said before holds for the
+        // cycle.
         return passive_ || (status & kSrEstat) == kSrEstatPassive ? CanState::passive : CanState::active;
     }
 
@@ -221,12 +225,14 @@ class CanController final : public CanPort {
     void look_for_bus_off() {
         using namespace can_reg;
         if (!running_) return;
-        if ((registers_.read(kIsr) & kIsrBsoff) == 0 && (registers_.read(kSr) & kSrEstat) != kSrEstatBusOff) return;
+        if ((registers_.read(kIsr) & kIsrBsoff) == 0 && (registers_.read(kSr) & kSrEstat) != kSrEstatBusOff)
+            return;
         ++counters_.bus_off;
         counters_.dropped += in_flight_;
         in_flight_ = 0;
         hold_received();
-        registers_.write(kSrr, kSrrSrst);  // configuration mode: off the bus until begin_cycle starts it again
+        registers_.write(kSrr,
+                         kSrrSrst);  // configuration mode: off the bus until begin_cycle starts it again
         running_ = false;
         bus_off_ = true;
         retry_us_ = timer_.now_us() + config_.recovery_us;
@@ -267,7 +273,8 @@ class CanController final : public CanPort {
             frame.length = static_cast<std::uint8_t>(dlc < 8 ? dlc : 8);
             for (std::size_t b = 0; b < 8; ++b) {
                 const std::uint32_t w = b < 4 ? data_1 : data_2;
-                frame.data[b] = b < frame.length ? static_cast<std::uint8_t>(w >> (24 - 8 * (b % 4))) : std::uint8_t{0};
+                frame.data[b] =
+                    b < frame.length ? static_cast<std::uint8_t>(w >> (24 - 8 * (b % 4))) : std::uint8_t{0};
             }
             ++counters_.received;
             return true;

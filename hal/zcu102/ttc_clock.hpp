@@ -11,9 +11,10 @@ namespace hal::zcu102 {
 
 struct TtcConfig {
     std::uint32_t reference_hz = kReferenceHz;  ///< LPD_LSBUS_CLK
-    /// The reference clock is divided by 2^prescaler_log2. 8: a count is 2.56 us, far below what a period needs, and a
-    /// counter of 16 bits, as the emulator has, turns over in 126 ms, which is longer than a period; the board's 32 bits
-    /// last three hours. (The emulator with -icount also needs a prescaler: without one it can hang.)
+    /// The reference clock is divided by 2^prescaler_log2. 8: a count is 2.56 us, far below what a period
+    /// needs, and a counter of 16 bits, as the emulator has, turns over in 126 ms, which is longer than a
+    /// period; the board's 32 bits last three hours. (The emulator with -icount also needs a prescaler:
+    /// without one it can hang.)
     std::uint32_t prescaler_log2 = 8;
 
     [[nodiscard]] constexpr bool valid() const {
@@ -22,15 +23,22 @@ struct TtcConfig {
 };
 static_assert(TtcConfig{}.valid());
 
-/// The counter runs freely and is extended to 64 bits at each look, so it must be looked at once a turn; the period is
-/// waited for by looking. Microseconds are derived from the count since start, never added up: no drift.
+/// The clock the timers run on. The emulator knows no clock block, which then reads as zero, and runs its
+/// timers at 133 MHz.
+inline std::uint32_t timer_reference_hz() {
+    return Mmio<kCrlApb>::read(crl_reg::kLpdLsbusCtrl) == 0 ? 133'000'000 : kReferenceHz;
+}
+
+/// The counter runs freely and is extended to 64 bits at each look, so it must be looked at once a turn; the
+/// period is waited for by looking. Microseconds are derived from the count since start, never added up: no
+/// drift.
 template <RegisterBlock Registers>
 class TtcClock final : public Clock {
   public:
     TtcClock(Registers registers, const TtcConfig& config) : registers_(registers), config_(config) {}
 
-    /// Sets timer 1 going. The counter's width is what the interval register keeps: 32 bits in the Zynq UltraScale+, 16
-    /// in its emulator.
+    /// Sets timer 1 going. The counter's width is what the interval register keeps: 32 bits in the Zynq
+    /// UltraScale+, 16 in its emulator.
     void start() {
         using namespace ttc_reg;
         registers_.write(kInterruptEnable, 0);

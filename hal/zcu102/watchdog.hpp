@@ -1,4 +1,5 @@
-/// The system watchdog of the low-power domain (SWDT), which resets the system through the platform management unit.
+/// The system watchdog of the low-power domain (SWDT), which resets the system through the platform
+/// management unit.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +12,15 @@ namespace hal::zcu102 {
 
 struct WatchdogConfig {
     std::uint32_t reference_hz = kReferenceHz;  ///< LPD_LSBUS_CLK
-    /// Kick to reset. Below two periods a single slow cycle would reset; above five the car drives blind for too long.
+    /// Kick to reset. Below two periods a single slow cycle would reset; above five the car drives blind for
+    /// too long.
     std::uint32_t timeout_ms = 300;
 
     static constexpr std::uint32_t kClksel = 2;  ///< of the prescalers 8, 64, 512, 4096
     static constexpr std::uint32_t kPrescaler = 512;
 
-    /// CRV, the top 12 of the counter's 24 bits; the others start as ones. Rounded up: never earlier than asked for.
+    /// CRV, the top 12 of the counter's 24 bits; the others start as ones. Rounded up: never earlier than
+    /// asked for.
     [[nodiscard]] constexpr std::uint32_t counter_restart() const {
         const std::uint64_t counts = std::uint64_t{timeout_ms} * (reference_hz / 1000) / kPrescaler;
         return static_cast<std::uint32_t>(counts >> 12);
@@ -27,7 +30,8 @@ struct WatchdogConfig {
                                           (reference_hz / 1000));
     }
     [[nodiscard]] constexpr bool valid() const {
-        return timeout_ms >= 200 && counter_restart() < 4096 && actual_ms() >= timeout_ms && actual_ms() <= 500;
+        return timeout_ms >= 200 && counter_restart() < 4096 && actual_ms() >= timeout_ms &&
+               actual_ms() <= 500;
     }
 };
 static_assert(WatchdogConfig{}.valid());
@@ -41,7 +45,8 @@ class SystemWatchdog final : public Watchdog {
     void start() override {
         using namespace swdt_reg;
         swdt_.write(kMode, kModeKey);  // off while it is set up
-        swdt_.write(kControl, kControlKey | config_.counter_restart() << kControlCrvShift | WatchdogConfig::kClksel);
+        swdt_.write(kControl,
+                    kControlKey | config_.counter_restart() << kControlCrvShift | WatchdogConfig::kClksel);
         swdt_.write(kRestart, kRestartKey);
         // Its output is an error signal to the PMU, which turns it into a system reset when told to.
         pmu_.write(pmu_reg::kErrorStatus1, pmu_reg::kErrorLpdSwdt);

@@ -1,0 +1,64 @@
+// The radar on the real-time processor of the ZCU102. UART0: console, 115200 baud. UART1: beat frames, 1
+// Mbaud (see hal/common/beat_link.hpp). CAN1, the controller with a transceiver on the board: 500 kbit/s.
+
+#include "firmware/radar.hpp"
+#include "firmware/service_console.hpp"
+#include "hal/bare_metal/startup.hpp"
+#include "hal/common/beat_input.hpp"
+#include "hal/common/uart_console.hpp"
+#include "hal/zcu102/can.hpp"
+#include "hal/zcu102/reset.hpp"
+#include "hal/zcu102/ttc_clock.hpp"
+#include "hal/zcu102/uart.hpp"
+#include "hal/zcu102/watchdog.hpp"
+
+namespace {
+
+using hal::Mmio;
+using namespace hal::zcu102;
+
+constexpr firmware::RadarConfig kConfig{};
+static_assert(kConfig.valid());
+
+using Timer = TtcClock<Mmio<kTtc0>>;
+
+/// Where the front end's DMA writes. The processor sees it in its tightly-coupled memory; to the DMA that is
+/// 0xFFE20000 + (address - 0x20000).
+hal::RingMemory front_end_ring;
+
+Timer timer({}, {.reference_hz = timer_reference_hz()});
+Uart<Mmio<kUart0>> console_uart({});
+Uart<Mmio<kUart1>> beat_uart({});
+hal::UartConsole console(console_uart);
+CanController<Mmio<kCan1>, Timer> can_port({}, timer);
+SystemWatchdog<Mmio<kSwdt>, Mmio<kPmuGlobal>> watchdog({}, {});
+hal::BeatInput beat(front_end_ring, beat_uart, timer, kConfig.waveform.period_ms * 1000U);
+
+const hal::Board board{beat, can_port, timer, watchdog, console};
+firmware::Radar radar(kConfig, board);
+
+}  // namespace
+
+int main() {
+    const hal::ResetRecord last = begin_run();
+    timer.start();
+    console_uart.start(baud_rate(kReferenceHz, 115'200));
+    beat_uart.start(baud_rate(kReferenceHz, hal::kBeatLinkBaud));
+    can_port.start();
+
+    firmware::ServiceConsole service(radar, board);
+    const hal::MemoryUse memory = hal::memory_use();
+    service.banner({.name = RADAR_BOARD_NAME,
+                    .last_run_ended_by = hal::to_string(last.cause),
+                    .fault_pc = last.pc,
+                    .fault_status = last.status,
+                    .fault_address = last.address,
+                    .rom_bytes = memory.rom_bytes,
+                    .static_ram_bytes = memory.static_ram_bytes,
+                    .stack_bytes = memory.stack_bytes});
+    radar.start();
+    for (;;) {
+        radar.run_cycle();
+        service.poll(hal::memory_use().stack_used_bytes);
+    }
+}
