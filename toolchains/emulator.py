@@ -5,6 +5,8 @@ As a program: prints what the image writes to its console, and exits with the im
 up). As a module: class Emulator, whose serial lines are sockets that a test talks to.
 
     toolchains/emulator.py --board zcu102 build/zcu102-r5/firmware/radar_zcu102.elf --seconds 5
+
+With --serve a serial line is offered to another program as a UNIX socket, as a serial adapter would offer it as a tty.
 """
 
 import argparse
@@ -30,28 +32,34 @@ TIMEOUT_EXIT_CODE = 124
 class Emulator:
     """A running image. `serial[name]` is a connected socket for each name of SERIAL_LINES.
 
+    serve: {name: path} of serial lines that another program connects to at that path, in place of `serial`.
     can_interface: SocketCAN interface to join the emulated bus to (zcu102 only).
     icount: one instruction takes 2**icount ns of virtual time; None lets virtual time follow the wall clock.
     warp: with icount, virtual time jumps while the processor sleeps instead of waiting for the wall clock.
     """
 
-    def __init__(self, board, image, can_interface=None, icount=None, warp=False, extra=()):
+    def __init__(self, board, image, can_interface=None, icount=None, warp=False, serve=None,
+                 extra=()):
         self.board = board
         self.directory = tempfile.mkdtemp(prefix="radar_emulator_")
         self.serial = {}
         self.process = None
         try:
-            self._start(image, can_interface, icount, warp, list(extra))
+            self._start(image, can_interface, icount, warp, serve or {}, list(extra))
         except BaseException:
             self.close()
             raise
 
-    def _start(self, image, can_interface, icount, warp, extra):
+    def _start(self, image, can_interface, icount, warp, serve, extra):
         if not os.path.exists(image):
             raise FileNotFoundError(f"no image {image}: build it with cmake --build --preset <board>")
         listeners = {}
         serial_options = []
         for name in SERIAL_LINES[self.board]:
+            if name in serve:
+                serial_options += ["-chardev", f"socket,id={name},path={serve[name]},server=on,wait=off",
+                                   "-serial", f"chardev:{name}"]
+                continue
             path = os.path.join(self.directory, name)
             listener = socket.socket(socket.AF_UNIX)
             listener.bind(path)
@@ -76,8 +84,9 @@ class Emulator:
             raise FileNotFoundError(f"{command[0]} is not installed: apt-get install qemu-system-arm")
         # Without a sound driver named, the display port's audio looks for one and complains.
         environment = dict(os.environ, QEMU_AUDIO_DRV="none")
+        self.messages = open(os.path.join(self.directory, "messages"), "w+")
         self.process = subprocess.Popen(command + common + serial_options + extra, stdin=subprocess.DEVNULL,
-                                        env=environment)
+                                        stderr=self.messages, env=environment)
         for name, listener in listeners.items():
             self.serial[name] = self._accept(listener)
         if self.board == "zcu102":
@@ -93,7 +102,13 @@ class Emulator:
             except socket.timeout:
                 if self.process.poll() is not None:
                     break
-        raise RuntimeError(f"the emulator did not start (exit code {self.process.poll()})")
+        raise RuntimeError(f"the emulator did not start (exit code {self.process.poll()}): {self.complaints()}")
+
+    def complaints(self):
+        """What the emulator has to say, other than that it has no sound."""
+        self.messages.flush()
+        with open(self.messages.name) as messages:
+            return "".join(line for line in messages if "module audio-" not in line)
 
     def _release_r5(self, qmp_path):
         """Without this the emulator leaves the R5 powered off and starts the application processor."""
@@ -180,6 +195,8 @@ def main():
     parser.add_argument("image")
     parser.add_argument("--seconds", type=float, default=10, help="end after this time (default 10)")
     parser.add_argument("--icount", type=int, help="one instruction takes 2^ICOUNT ns of virtual time")
+    parser.add_argument("--serve", metavar="LINE=PATH", action="append", default=[],
+                        help="offer a serial line (console, beat, can) as a UNIX socket at PATH")
     parser.add_argument("--can", metavar="IFACE", help="join the emulated CAN bus to this interface (zcu102)")
     arguments = parser.parse_args()
 
@@ -189,7 +206,7 @@ def main():
 
     try:
         code, _ = run(arguments.board, arguments.image, arguments.seconds, show, icount=arguments.icount,
-                      can_interface=arguments.can)
+                      can_interface=arguments.can, serve=dict(line.split("=", 1) for line in arguments.serve))
     except (OSError, RuntimeError) as error:
         print(f"emulator.py: {error}", file=sys.stderr)
         return 1
