@@ -33,12 +33,24 @@
 
 namespace tracking {
 
-/// Subsets are taken of at most this many tracks or measurements.
-inline constexpr int kJpdaMaxItems = 8;
-/// steps * 2^items may not exceed this: 8 tracks with 12 shared measurements, 7 with 24, 6 with 48, 5 with
-/// any.
-inline constexpr int kJpdaTable = 3072;
-inline constexpr int kJpdaMaxPairs = 5 * kMaxMeasurements;
+/// How large a cluster is still solved exactly; it costs memory and bounds the work.
+struct JpdaCapacity {
+    int items = 8;  ///< subsets are taken of at most this many tracks or measurements
+    /// steps * 2^items may not exceed this. 3072: 8 tracks with 12 shared measurements, 7 with 24, 6 with 48,
+    /// 5 with any.
+    int table = 3072;
+
+    [[nodiscard]] constexpr std::size_t sets() const { return std::size_t{1} << items; }
+    /// steps * items at most.
+    [[nodiscard]] constexpr std::size_t pairs() const {
+        int most = 0;
+        for (int i = 1; i <= items; ++i) {
+            const int steps = (table >> i) < kMaxMeasurements ? table >> i : kMaxMeasurements;
+            if (steps * i > most) most = steps * i;
+        }
+        return static_cast<std::size_t>(most);
+    }
+};
 /// Sweeps of belief propagation over a cluster that does not fit.
 inline constexpr int kBeliefSweeps = 12;
 
@@ -50,26 +62,31 @@ struct JpdaStatus {
 };
 
 /// A bipartite graph of weights: `steps` elements of one side, `items` of the other.
-template <class S>
+template <class S, JpdaCapacity Capacity>
 struct JpdaGraph {
     int steps = 0;
     int items = 0;
-    std::array<S, kJpdaMaxPairs> pair{};  ///< [step * items + item]; in: weight, out: probability
-    std::array<std::uint8_t, kMaxMeasurements> adjacent{};  ///< per step, items with a pair, as bits
-    std::array<S, kMaxMeasurements> step_alone{};           ///< in: weight unmatched, out: probability
-    std::array<S, kJpdaMaxItems> item_alone{};
+    std::array<S, Capacity.pairs()> pair{};  ///< [step * items + item]; in: weight, out: probability
+    std::array<std::uint16_t, kMaxMeasurements> adjacent{};  ///< per step, items with a pair, as bits
+    std::array<S, kMaxMeasurements> step_alone{};            ///< in: weight unmatched, out: probability
+    std::array<S, static_cast<std::size_t>(Capacity.items)> item_alone{};
 };
 
 /// Scratch memory of jpda, sizeof(JpdaWorkspace<dsp::Real>) = 15.6 KiB, static on the targets.
-template <class S>
+template <class S, JpdaCapacity Capacity = JpdaCapacity{}>
 struct JpdaWorkspace {
-    JpdaGraph<S> graph;
+    static_assert(Capacity.items <= 16, "adjacent holds them as bits");
+    static_assert(std::floating_point<S> || Capacity.items <= 8, "sums over all sets must fit a WideSum");
+    static_assert(Capacity.table >= kMaxTracks * kMaxGated, "belief propagation uses it too");
+    static constexpr JpdaCapacity kCapacity = Capacity;
+
+    JpdaGraph<S, Capacity> graph;
     Assignment<S> best;
-    std::array<S, kJpdaTable> table;                      ///< backward weights, [step][set]
-    std::array<S, std::size_t{1} << kJpdaMaxItems> used;  ///< forward weights of the sets of used items
-    std::array<S, kMaxTracks> own_weight;                 ///< of "missed or a private measurement"
-    std::array<S, kMaxTracks> missed_weight;              ///< its part that is "missed", in the same scale
-    std::array<std::uint32_t, kMaxMeasurements> users;    ///< rows that have the measurement, as bits
+    std::array<S, static_cast<std::size_t>(Capacity.table)> table;  ///< backward weights, [step][set]
+    std::array<S, Capacity.sets()> used;                ///< forward weights of the sets of used items
+    std::array<S, kMaxTracks> own_weight;               ///< of "missed or a private measurement"
+    std::array<S, kMaxTracks> missed_weight;            ///< its part that is "missed", in the same scale
+    std::array<std::uint32_t, kMaxMeasurements> users;  ///< rows that have the measurement, as bits
 };
 
 namespace detail {
@@ -107,8 +124,8 @@ void rescale(std::span<S> weights) {
 
 /// Replaces the weights of `graph` by marginal probabilities. False if every joint event underflowed.
 /// Cost about 3 * 2^items * pairs / 2 multiply-adds.
-template <class S>
-bool exact_marginals(JpdaGraph<S>& graph, std::span<S> table, std::span<S> used) {
+template <class S, JpdaCapacity Capacity>
+bool exact_marginals(JpdaGraph<S, Capacity>& graph, std::span<S> table, std::span<S> used) {
     const int items = graph.items;
     const int steps = graph.steps;
     const std::size_t sets = std::size_t{1} << items;
@@ -149,7 +166,7 @@ bool exact_marginals(JpdaGraph<S>& graph, std::span<S> table, std::span<S> used)
         const std::span<S> after = backward(k);
         const auto step = static_cast<std::size_t>(k);
         const S alone = graph.step_alone[step];
-        std::array<WideSum<S>, kJpdaMaxItems> through{};
+        std::array<WideSum<S>, static_cast<std::size_t>(Capacity.items)> through{};
         WideSum<S> past;
         for (std::size_t set = 0; set < sets; ++set) {
             const S w = used[set];
@@ -189,7 +206,7 @@ bool exact_marginals(JpdaGraph<S>& graph, std::span<S> table, std::span<S> used)
         }
     }
 
-    std::array<WideSum<S>, kJpdaMaxItems> unused{};
+    std::array<WideSum<S>, static_cast<std::size_t>(Capacity.items)> unused{};
     WideSum<S> total;
     for (std::size_t set = 0; set < sets; ++set) {
         if (used[set] == S(0)) continue;
@@ -260,9 +277,9 @@ void approximate_marginals(std::span<AssociationRow<S>> rows, std::uint32_t clus
 
 /// Turns the floored log weights of one cluster (beta of shared candidates, `missed`) into probabilities,
 /// using the prices in work.best. False if the result is approximate.
-template <class S>
+template <class S, JpdaCapacity Capacity>
 bool solve_cluster(std::span<AssociationRow<S>> rows, std::uint32_t cluster, std::uint64_t measurements,
-                   JpdaWorkspace<S>& work) {
+                   JpdaWorkspace<S, Capacity>& work) {
     // Weights against the best joint event: at most 1 each, and 1 along that event.
     std::array<S, kMaxMeasurements> alone;
     for (std::uint64_t m = measurements; m != 0; m &= m - 1) {
@@ -283,10 +300,10 @@ bool solve_cluster(std::span<AssociationRow<S>> rows, std::uint32_t cluster, std
     const int tracks = std::popcount(cluster);
     const int shared = std::popcount(measurements);
     const bool items_are_tracks = tracks <= shared;
-    JpdaGraph<S>& graph = work.graph;
+    JpdaGraph<S, Capacity>& graph = work.graph;
     graph.items = items_are_tracks ? tracks : shared;
     graph.steps = items_are_tracks ? shared : tracks;
-    if (graph.items > kJpdaMaxItems || (graph.steps << graph.items) > kJpdaTable) {
+    if (graph.items > Capacity.items || (graph.steps << graph.items) > Capacity.table) {
         approximate_marginals<S>(rows, cluster, measurements, alone, work.table);
         return false;
     }
@@ -314,7 +331,7 @@ bool solve_cluster(std::span<AssociationRow<S>> rows, std::uint32_t cluster, std
     for (int k = 0; k < graph.steps; ++k) graph.adjacent[static_cast<std::size_t>(k)] = 0;
     for_each_pair([&](const Candidate<S>& item, std::size_t k, std::size_t i) {
         graph.pair[k * static_cast<std::size_t>(graph.items) + i] = item.beta;
-        graph.adjacent[k] = static_cast<std::uint8_t>(graph.adjacent[k] | 1U << i);
+        graph.adjacent[k] = static_cast<std::uint16_t>(graph.adjacent[k] | 1U << i);
     });
     for_each_track([](S row_alone, S& in_graph) { in_graph = row_alone; });
     std::size_t position = 0;
@@ -340,10 +357,10 @@ bool solve_cluster(std::span<AssociationRow<S>> rows, std::uint32_t cluster, std
 /// Double: within 1e-12 of listing all events. dsp::Real: within 2e-3, rows sum to 1 within 1e-3. Certain
 /// detection (log_missed = -inf, or the smallest S) and any likelihood are allowed.
 /// At most kMaxTracks rows; measurement indices below kMaxMeasurements, ascending within a row.
-/// Cost a cluster: exact at most 3 * kJpdaTable * kJpdaMaxItems / 2, about 37,000, multiply-adds;
-/// approximated 2 * kBeliefSweeps = 24 divisions a pair, at most 12,300 for all 32 x 16 pairs.
-template <class S>
-JpdaStatus jpda(std::span<AssociationRow<S>> rows, JpdaWorkspace<S>& work) {
+/// Cost a cluster: exact at most 3 * table * items / 2 of the capacity, by default about 37,000,
+/// multiply-adds; approximated 2 * kBeliefSweeps = 24 divisions a pair, at most 12,300 for all 32 x 16 pairs.
+template <class S, JpdaCapacity Capacity>
+JpdaStatus jpda(std::span<AssociationRow<S>> rows, JpdaWorkspace<S, Capacity>& work) {
     JpdaStatus status;
     work.users.fill(0);
     for (std::size_t t = 0; t < rows.size(); ++t)
