@@ -10,8 +10,8 @@ namespace {
 constexpr std::array<std::uint8_t, kIdCount> make_lengths() {
     std::array<std::uint8_t, kIdCount> lengths{};
     for (const Message* message : kMessages)
-        for (int i = 0; i < message->count; ++i)
-            lengths[static_cast<std::size_t>(message->id - kFirstId + i)] = message->length;
+        for (std::size_t i = 0; i < message->count; ++i)
+            lengths[message->id - kFirstId + i] = message->length;
     return lengths;
 }
 

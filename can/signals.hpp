@@ -29,13 +29,13 @@ struct Signal {
     bool is_signed = false;     ///< two's complement
     std::int32_t step = 1;      ///< one count in the unit of the struct in can/messages.hpp, for example 5 mm
     std::uint8_t decimals = 0;  ///< one unit of the DBC is 10^decimals units of the struct: 3 for mm and m
-    std::string_view unit = "";
+    std::string_view unit = {};
     std::int64_t min = 0;  ///< in counts
     std::int64_t max = 0;  ///< in counts
     std::optional<std::int64_t> invalid =
         std::nullopt;      ///< count that means "not available"; outside min..max
     bool or_more = false;  ///< max stands for all that is greater, so reaching it is no error
-    std::string_view comment = "";
+    std::string_view comment = {};
     std::span<const ValueName> values = {};
 };
 

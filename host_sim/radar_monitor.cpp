@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
-#include <filesystem>
+#include <exception>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -172,9 +172,7 @@ int run(const Options& options) {
     return monitor.errors() == 0 ? kClean : kErrorsSeen;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int parse_and_run(int argc, char** argv) {
     Options options;
     CLI::App app{
         "Decodes the radar's CAN messages and checks them end to end: CRC, counter, length, ranges, torn "
@@ -219,4 +217,14 @@ int main(int argc, char** argv) {
     std::signal(SIGINT, [](int) { stop_requested = 1; });
     std::signal(SIGTERM, [](int) { stop_requested = 1; });
     return run(options);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return parse_and_run(argc, argv);
+    } catch (const std::exception& error) {
+        return refuse(error.what());
+    }
 }

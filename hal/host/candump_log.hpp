@@ -78,7 +78,7 @@ class CandumpReader {
 };
 
 /// Any port, with everything sent and received written to a log.
-class LoggingPort : public CanPort {
+class LoggingPort final : public CanPort {
   public:
     LoggingPort(CanPort& port, Clock& clock, CandumpWriter& log) : port_(port), clock_(clock), log_(log) {}
 

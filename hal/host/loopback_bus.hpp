@@ -22,7 +22,7 @@ static_assert(LoopbackConfig{}.valid());
 /// Not thread safe: all ports belong to one thread.
 class LoopbackBus {
   public:
-    class Port : public CanPort {
+    class Port final : public CanPort {
       public:
         /// Frames longer than 8 bytes or with more than 11 bits of identifier are dropped, as no controller
         /// could send them. On a bus that is down every frame is.

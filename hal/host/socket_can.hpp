@@ -53,7 +53,7 @@ static_assert(SocketCanConfig{}.valid());
 /// begin_cycle() tries to open it again, once a call. What the kernel has queued can not be called back:
 /// after a stuck bus recovers, at most its transmit queue (`txqueuelen`, 10 frames on most interfaces) of old
 /// frames precedes the newest list.
-class SocketCan : public CanPort {
+class SocketCan final : public CanPort {
   public:
     /// Fails, saying why and what to do, if the interface does not exist, is down, is no CAN interface, or
     /// the kernel has no CAN.
