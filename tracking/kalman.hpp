@@ -11,10 +11,10 @@ namespace tracking {
 template <class S>
 struct MotionModel {
     S period_s = constant<S>(1, 10);
-    /// Half to the whole of the largest relative acceleration, by the usual rule: 3 m/s^2 follows braking at
-    /// 6 m/s^2 inside a 4-sigma gate. Larger keeps harder manoeuvres but lets neighbours into the gate
+    /// Between half and the whole of the hardest braking, by the usual rule: 8 m/s^2 then stays inside a
+    /// 4-sigma gate even when two detections are missed meanwhile. Larger lets neighbours into the gate
     /// sooner.
-    S acceleration_sigma_mps2 = S(3);
+    S acceleration_sigma_mps2 = S(5);
 
     [[nodiscard]] constexpr bool valid() const {
         return period_s >= constant<S>(1, 100) && period_s <= S(1) &&

@@ -2,7 +2,7 @@
 ///
 /// A frame, in order: predict; associate and update confirmed tracks; do the same for tentative tracks with
 /// the measurements confirmed ones did not claim; start tracks from pairs of measurements nobody claimed in
-/// this frame and the last; confirm, merge, delete.
+/// this frame and one of the last two; confirm, merge, delete.
 #pragma once
 
 #include <array>
@@ -129,6 +129,14 @@ class Tracker {
     [[nodiscard]] const TrackerConfig<S>& config() const { return config_; }
 
   private:
+    /// A measurement nobody claimed, which may start a track with one of the next frames.
+    struct Pending {
+        Measurement<S> measurement;
+        std::uint8_t age = 0;  ///< frames ago
+    };
+    /// Frames between the two measurements of a start: 2, so that one miss does not delay it further.
+    static constexpr int kStartFrames = 2;
+
     static constexpr std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
 
     std::span<Track<S>> live() { return {track_.data(), static_cast<std::size_t>(count_)}; }
@@ -136,6 +144,10 @@ class Tracker {
         int n = 0;
         for (const Track<S>& t : tracks()) n += t.is_confirmed() == confirmed ? 1 : 0;
         return n;
+    }
+
+    [[nodiscard]] bool in_field(const Track<S>& t) const {
+        return t.x[0] >= S(0) && t.x[0] <= config_.max_range_m;
     }
 
     static bool usable(const Measurement<S>& m) {
@@ -152,14 +164,13 @@ class Tracker {
                          std::span<const Measurement<S>> measurements);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
-    bool best_start(const Measurement<S>& from, const Measurement<S>& to, S& distance2,
-                    Track<S>& track) const;
+    bool best_start(const Pending& from, const Measurement<S>& to, S& distance2, Track<S>& track) const;
     bool make_room_for_tentative(S snr_db, TrackerReport& report);
     bool make_room_for_confirmed(S snr_db, TrackerReport& report);
     void confirm(TrackerReport& report);
     void merge(TrackerReport& report);
     void remove_lost(TrackerReport& report);
-    void remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed);
+    void remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, std::uint64_t used);
     std::uint8_t next_id();
     void erase_free();
 
@@ -170,7 +181,7 @@ class Tracker {
     AssociatorWorkspace<S> work_{};
     ImmModel<S, 2, 2> model_;
     std::array<ImmState<S, 2, 2>, kMaxTracks> modes_{};       // of track_, in the same order
-    std::array<Measurement<S>, kMaxMeasurements> pending_{};  // unclaimed measurements of the last frame
+    std::array<Pending, kMaxMeasurements> pending_{};
     int count_ = 0;
     int pending_count_ = 0;
     std::uint8_t last_id_ = 0;
@@ -324,25 +335,32 @@ void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
     track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 4);
 }
 
-/// The track two measurements make, one period apart, if their range difference agrees with their range rates
-/// for one of the possible folds and both rates agree.
+/// The track two measurements make if their range rates agree, and for one of the possible folds their range
+/// difference agrees with the range rate.
 template <class S>
-bool Tracker<S>::best_start(const Measurement<S>& from, const Measurement<S>& to, S& distance2,
+bool Tracker<S>::best_start(const Pending& from, const Measurement<S>& to, S& distance2,
                             Track<S>& track) const {
+    const Vec2<S> from_noise = gate_.noise(from.measurement, false);
+    const Vec2<S> to_noise = gate_.noise(to, false);
+    // The folded difference of the range rates is the same for every fold: nearly all pairs fail here.
+    const S change = gate_.innovation(from.measurement.z, to.z)[1];
+    const S speed_up = config_.motion.acceleration_sigma_mps2 * config_.motion.period_s;
+    const S variance = from_noise[1] + to_noise[1] + speed_up * speed_up * static_cast<int>(from.age);
+    if (change * change > config_.gate.gate * variance) return false;
+
+    Mat2<S> p = innovation_covariance(Mat2<S>(Mat2<S>::Zero()), from_noise);
+    for (int i = 0; i < from.age; ++i) p = predict_covariance(p, config_.motion);
     const S span = config_.gate.rate_span_mps;
     const int folds = span > S(0) ? 1 : 0;
     bool found = false;
     for (int fold = -folds; fold <= folds; ++fold) {
-        Vec2<S> x(from.z[0] - config_.gate.alias_range_m * fold, from.z[1] + span * fold);
+        Vec2<S> x(from.measurement.z[0] - config_.gate.alias_range_m * fold,
+                  from.measurement.z[1] + span * fold);
         if (x[1] < config_.min_start_rate_mps || x[1] > config_.max_start_rate_mps) continue;
-        x = predict_state(x, config_.motion);
-        const Vec2<S> nu = gate_.innovation(x, to.z);
-        Mat2<S> p = Mat2<S>::Zero();
-        p = innovation_covariance(p, gate_.noise(from, false));
-        p = predict_covariance(p, config_.motion);
+        for (int i = 0; i < from.age; ++i) x = predict_state(x, config_.motion);
         S d2(0);
         S log_density(0);
-        if (!gate_.test(nu, p, gate_.noise(to, false), d2, log_density)) continue;
+        if (!gate_.test(gate_.innovation(x, to.z), p, to_noise, d2, log_density)) continue;
         if (found && d2 >= distance2) continue;
         found = true;
         distance2 = d2;
@@ -375,9 +393,6 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
             partner = i;
         }
         if (partner < 0) continue;
-        if (!make_room_for_tentative(m.snr_db, report)) continue;
-        used |= bit(static_cast<std::size_t>(partner));
-        left &= ~bit(index);
         const Vec2<S> nu = gate_.innovation(best.x, m.z);
         const Vec2<S> r = gate_.noise(m, false);
         const Mat2<S> k = gain(best.covariance, Ldl<S>(innovation_covariance(best.covariance, r)));
@@ -385,27 +400,41 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         best.x[0] += move[0];
         best.x[1] += move[1];
         best.covariance = posterior_covariance(best.covariance, k, r);
+        if (!in_field(best) || !make_room_for_tentative(m.snr_db, report)) continue;
+        used |= bit(static_cast<std::size_t>(partner));
+        left &= ~bit(index);
         best.id = next_id();
         best.state = TrackState::tentative;
         best.existence = config_.initial_existence;
         best.snr_db = m.snr_db;
-        best.age = 1;
+        best.age = pending_[static_cast<std::size_t>(partner)].age;
         best.hits = 2;
         best.measured = true;
         modes_[static_cast<std::size_t>(count_)].start(best.x, best.covariance);
         track_[static_cast<std::size_t>(count_++)] = best;
         ++report.initiated;
     }
-    remember(measurements, left);
+    remember(measurements, left, used);
 }
 
+/// Pending from now on: the unclaimed measurements of this frame, and as far as there is room those of the
+/// last that still have no partner.
 template <class S>
-void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed) {
-    pending_count_ = 0;
-    for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
-        pending_[static_cast<std::size_t>(pending_count_++)] =
-            measurements[static_cast<std::size_t>(std::countr_zero(rest))];
+void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
+                          std::uint64_t used) {
+    const int room = kMaxMeasurements - std::popcount(unclaimed);
+    int kept = 0;
+    for (int i = 0; i < pending_count_ && kept < room; ++i) {
+        const auto from = static_cast<std::size_t>(i);
+        if ((used & bit(from)) != 0 || pending_[from].age >= kStartFrames) continue;
+        pending_[static_cast<std::size_t>(kept++)] = {pending_[from].measurement,
+                                                      static_cast<std::uint8_t>(pending_[from].age + 1)};
     }
+    for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
+        pending_[static_cast<std::size_t>(kept++)] = {
+            measurements[static_cast<std::size_t>(std::countr_zero(rest))], 1};
+    }
+    pending_count_ = kept;
 }
 
 /// With kMaxTentative already, the weakest gives way to a stronger one.
@@ -482,7 +511,7 @@ void Tracker<S>::merge(TrackerReport& report) {
 template <class S>
 void Tracker<S>::remove_lost(TrackerReport& report) {
     for (Track<S>& t : live()) {
-        if (t.x[0] < S(0) || t.x[0] > config_.max_range_m) {
+        if (!in_field(t)) {
             t.state = TrackState::free;
             ++report.left;
         } else if (t.existence < config_.delete_existence || t.misses > config_.max_misses) {

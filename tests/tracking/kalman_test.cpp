@@ -105,7 +105,7 @@ TEST(Kalman, PredictionIsFPFPlusQ) {
     std::mt19937 random(2);
     for (int trial = 0; trial < 100; ++trial) {
         const Eigen::Matrix2d p = random_covariance(random);
-        const Eigen::Matrix2d expected = f * p * f.transpose() + 9 * g * g.transpose();
+        const Eigen::Matrix2d expected = f * p * f.transpose() + 25 * g * g.transpose();
         CHECK(largest_difference(expected, tracking::predict_covariance(p, model)) < 1e-12);
         CHECK(largest_difference(expected,
                                  tracking::predict_covariance(scalars<Real>(p), MotionModel<Real>{})) < 2e-6);
@@ -127,7 +127,7 @@ TEST(Kalman, FixedPointCovarianceStaysPositiveAndOnTheRiccatiPath) {
     Mat2<Real> p = scalars<Real>(reference);
     double worst = 0;
     for (int frame = 0; frame < 100'000; ++frame) {
-        reference = (f * reference * f.transpose() + 9 * g * g.transpose()).eval();
+        reference = (f * reference * f.transpose() + 25 * g * g.transpose()).eval();
         p = tracking::predict_covariance(p, model);
         if (u(random) < 0.9) {
             const Real r0 = scalar<Real>(0.0225 * std::pow(40, u(random)));

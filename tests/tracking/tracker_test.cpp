@@ -268,8 +268,9 @@ TEST(Tracker, TwoTracksOfOneTargetMergeIntoTheOlder) {
     Tracker<Real> tracker{TrackerConfig<Real>{}};
     int range = 9000;
     int merged = 0;
-    // Two reflections one metre apart for a second, each with a track, then only one.
-    for (int frame = 0; frame < 60; ++frame, range -= 50) {
+    // Two reflections for a second, each with a track, then only one. Hidden behind the other the second
+    // track is coasted as long as any.
+    for (int frame = 0; frame < 70; ++frame, range -= 50) {
         const std::array both{at<Real>(range, -500, 22), at<Real>(range + 350, -500, 20)};
         merged += tracker.step(frame < 10 ? std::span(both) : std::span(both).first(1)).merged;
         if (frame == 9) LONGS_EQUAL(2, confirmed(tracker.tracks()));
