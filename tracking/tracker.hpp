@@ -30,7 +30,9 @@ struct TrackerConfig {
     MotionModel<S> motion;
     GateConfig<S> gate;
     Associator associator = Associator::ospda;
-    OrderStatisticsConfig<S> order_statistics;
+    /// With the covariance of what was decided: a track hidden in another's echo then doubts its place as one
+    /// that coasts does, and its gate is wide enough to find it again.
+    OrderStatisticsConfig<S> order_statistics{.covariance = CovarianceBetas::reshaped};
     IjipdaConfig ijipda;  ///< of Associator::ijipda
     RadarModes<S> modes;  ///< of Associator::imm_pdaf, in place of motion
 
@@ -53,6 +55,9 @@ struct TrackerConfig {
     S delete_existence = constant<S>(1, 100);
     std::uint8_t confirm_hits = 3;  ///< measurements before confirmation; 3 in a row confirm in 0.3 s
     std::uint8_t max_misses = 50;   ///< frames in a row a confirmed track is coasted at most
+    /// A track less certain than this is deleted: it could be anywhere. Also what keeps variances in the
+    /// format.
+    S max_range_sigma_m = S(10);
 
     S merge_distance2 =
         S(1);  ///< tracks nearer than this (in their joint covariance) cannot be told apart ...
@@ -66,7 +71,8 @@ struct TrackerConfig {
                min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) && initial_existence > S(0) &&
                initial_existence < S(1) && survival > S(0) && survival <= S(1) && delete_existence > S(0) &&
                delete_existence < initial_existence && confirm_existence > initial_existence &&
-               confirm_existence < S(1) && confirm_hits >= 2 && max_misses >= 1 && merge_distance2 >= S(0) &&
+               confirm_existence < S(1) && confirm_hits >= 2 && max_misses >= 1 &&
+               max_range_sigma_m >= S(1) && max_range_sigma_m <= S(20) && merge_distance2 >= S(0) &&
                merge_frames >= 1 && replace_margin_db >= S(0);
     }
 };
@@ -180,7 +186,7 @@ class Tracker {
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
     AssociatorWorkspace<S> work_{};
     ImmModel<S, 2, 2> model_;
-    std::array<ImmState<S, 2, 2>, kMaxTracks> modes_{};       // of track_, in the same order
+    std::array<ImmState<S, 2, 2>, kMaxTracks> modes_{};  // of track_, in the same order
     std::array<Pending, kMaxMeasurements> pending_{};
     int count_ = 0;
     int pending_count_ = 0;
@@ -514,7 +520,8 @@ void Tracker<S>::remove_lost(TrackerReport& report) {
         if (!in_field(t)) {
             t.state = TrackState::free;
             ++report.left;
-        } else if (t.existence < config_.delete_existence || t.misses > config_.max_misses) {
+        } else if (t.existence < config_.delete_existence || t.misses > config_.max_misses ||
+                   t.covariance(0, 0) > config_.max_range_sigma_m * config_.max_range_sigma_m) {
             t.state = TrackState::free;
             ++report.deleted;
         }
