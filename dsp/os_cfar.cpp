@@ -119,7 +119,7 @@ void local_maxima(const PowerMap& map, int first_range_cell, CellMask& maxima) {
             // Left is earlier in memory and may be equal, right is later and may not; the ends wrap around.
             if (d == 0 ? row[left] >= x : row[left] > x) continue;
             if (d == kDopplerCells - 1 ? row[right] > x : row[right] >= x) continue;
-            if (r > first_range_cell) {
+            if (r > 0) {
                 const auto& before = map.cell[static_cast<std::size_t>(r - 1)];
                 if (before[left] > x || before[static_cast<std::size_t>(d)] > x || before[right] > x)
                     continue;

@@ -84,8 +84,9 @@ class OsCfar {
     std::int32_t noise_offset_;
 };
 
-/// Cells that are larger than their eight neighbours (Doppler cyclic, range ending at `first_range_cell` and
-/// at the last row). Of equal neighbours the one later in memory is larger, so a plateau gives one maximum.
+/// Cells from `first_range_cell` on that are larger than their eight neighbours (Doppler cyclic, range ending
+/// with the map). A neighbour below `first_range_cell` counts too: what rises towards it is the skirt of the
+/// leakage. Of equal neighbours the one later in memory is larger, so a plateau gives one maximum.
 void local_maxima(const PowerMap& map, int first_range_cell, CellMask& maxima);
 
 /// Tests the cells in `candidates` and writes those over threshold to `hits`. All cells or local maxima only,
