@@ -296,8 +296,12 @@ std::vector<StudyFilter> lee2000_filters() {
     filters.push_back({"ospda/optimal", Associator::ospda, order});
     order.reduction = Reduction::soft;
     filters.push_back({"ospda/soft", Associator::ospda, order});
-    filters.push_back({"ospda", Associator::ospda, {}});
-    filters.push_back({"osjpda", Associator::osjpda, {}});
+    order.reduction = Reduction::exclusive;
+    order.covariance = CovarianceBetas::decided;
+    filters.push_back({"ospda/decided", Associator::ospda, order});
+    const auto radar = TrackerConfig<double>{}.order_statistics;
+    filters.push_back({"ospda", Associator::ospda, radar});
+    filters.push_back({"osjpda", Associator::osjpda, radar});
     return filters;
 }
 
