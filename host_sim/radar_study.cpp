@@ -35,18 +35,21 @@ int main(int argc, char** argv) {
     CLI::App* lee2000 = app.add_subcommand("lee2000", "the comparison of Lee and Kim 2000");
     sim::Lee2000Options options;
     std::string out;
+    std::string scenarios;
     bool no_pictures = false;
     bool quiet = false;
     lee2000->add_option("--runs", options.runs, "runs of each condition")->check(CLI::Range(2, 1'000'000));
     lee2000->add_option("--seed", options.seed, "of the random numbers");
     lee2000->add_option("--out", out, "directory of the results, made if missing")->required();
     lee2000->add_option("--threads", options.run.threads, "default: all cores")->check(CLI::Range(1, 1024));
+    lee2000->add_option("--scenarios", scenarios, "directory of lee2000.json and the geometries it names");
     lee2000->add_flag("--no-pictures", no_pictures, "tables only; gnuplot is not needed");
     lee2000->add_flag("--quiet", quiet, "no progress on standard error");
     CLI11_PARSE(app, argc, argv);
     try {
         options.pictures = !no_pictures;
         options.run.directory = out;
+        options.scenarios = scenarios;
         options.run.show_progress = !quiet;
         sim::run_lee2000(options, ranks);
         return 0;

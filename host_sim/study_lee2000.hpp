@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct Lee2000Options {
     std::size_t runs = 200;  ///< of each condition
     std::uint64_t seed = 1;
     bool pictures = true;
+    std::filesystem::path scenarios;  ///< where lee2000.json and what it names lie; empty: the shipped ones
     StudyRunOptions run;
 };
 
