@@ -29,10 +29,9 @@ struct DspConfig {
 };
 static_assert(DspConfig{}.valid());
 
-/// All memory the signal processing needs besides the frame, about 13 KiB. `map`, `spectrum` and `peaks` are
-/// those of the frame after detect().
+/// All memory the signal processing needs besides the frame, about 13 KiB. `map` is valid after detect().
 struct Workspace {
-    Spectrum spectrum;
+    RangeSpectra spectra;
     PowerMap map;
     CellMask peaks;
     CandidateList candidates;

@@ -43,8 +43,7 @@ void Radar::reset_state() {
     tracker_.configure(config_.tracker);
     collision_.reset();
     health_ = Health(config_.health);
-    // After a restart nothing may depend on what the bus said before: whoever sent the command starts anew
-    // too.
+    // After a restart nothing may depend on what the bus said before: whoever sent the command starts anew too.
     receiver_ = can::Receiver{};
     transmitter_ = {};
     warning_ = {};
@@ -83,7 +82,11 @@ void Radar::begin_cycle() {
     next_start_us_ += period_us_;
     board_.can.begin_cycle();
     read_bus();
-    if (restart_due_) reset_state();
+    if (restart_due_) {
+        const can::CommandEcho echo = echo_;
+        reset_state();
+        echo_ = echo;
+    }
 }
 
 void Radar::read_bus() {
@@ -101,7 +104,10 @@ void Radar::read_bus() {
             case can::command::kMessage.id: {
                 can::Command command;
                 if (can::is_good(receiver_.receive(frame, command))) {
-                    answer(command);
+                    const can::CommandResult result = apply(command);
+                    echo_ = {command.code, result, command.sequence, value_in_force(command.code)};
+                    echo_due_ = true;
+                    if (result != can::CommandResult::applied) ++counters_.commands_refused;
                 }
                 break;
             }
@@ -109,17 +115,6 @@ void Radar::read_bus() {
                 receiver_.ignore();
         }
     }
-}
-
-void Radar::answer(const can::Command& command) {
-    if (echoes_ == echo_.size()) {
-        // Nothing is done that could not be answered.
-        ++counters_.commands_refused;
-        return;
-    }
-    const can::CommandResult result = apply(command);
-    if (result != can::CommandResult::applied) ++counters_.commands_refused;
-    echo_[echoes_++] = {command.code, result, command.sequence, value_in_force(command.code)};
 }
 
 can::CommandResult Radar::apply(const can::Command& command) {
@@ -261,8 +256,10 @@ void Radar::publish() {
 
     publish_objects(valid);
 
-    for (std::size_t i = 0; i < echoes_; ++i) send(transmitter_.frame(echo_[i]));
-    echoes_ = 0;
+    if (echo_due_) {
+        send(transmitter_.frame(echo_));
+        echo_due_ = false;
+    }
     if (counters_.cycles % kVersionEveryCycles == 1) {
         send(transmitter_.frame(can::Version{.major = kVersionMajor,
                                              .minor = kVersionMinor,

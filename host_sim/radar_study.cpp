@@ -1,10 +1,13 @@
 // A paper's experiment, repeated many times: tables on the terminal; CSV, JSON and pictures in a directory.
 #include <CLI/CLI.hpp>
+#include <array>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <string>
 
 #include "host_sim/study_lee2000.hpp"
+#include "host_sim/study_lowsnr.hpp"
 
 namespace {
 
@@ -22,8 +25,20 @@ Studies:
   lee2000   Lee and Kim 2000: NN, PDA, OSPDA, JPDA, OSJPDA on close targets in clutter; tables 1 to 3,
             figures 4 to 13 and 15, and whether the paper's claims hold, over clutter, detection
             probability, spacing and gate. Scenarios: host_sim/studies/lee2000*.json
+  lowsnr    2020: iterative JIPDA with amplitude information, levels 0 to 4 and full, and LM-IPDA, on five
+            targets at 13 and 20 dB, one- and two-point starts; figures 2 to 5, table 1 and the claims
 
 Exit status: 0 finished; 1 wrong usage, bad input or a file that cannot be read or written.)";
+
+struct Study {
+    const char* name;
+    const char* about;
+    std::size_t runs;
+    void (*run)(const sim::StudyOptions&, const sim::StudyRanks&);
+};
+constexpr std::array<Study, 2> kStudies{
+    {{"lee2000", "the comparison of Lee and Kim 2000", 200, sim::run_lee2000},
+     {"lowsnr", "iterative JIPDA at low signal-to-noise ratio, 2020", 500, sim::run_lowsnr}}};
 
 }  // namespace
 
@@ -32,26 +47,34 @@ int main(int argc, char** argv) {
     CLI::App app{kAbout};
     app.footer(kFooter);
     app.require_subcommand(1);
-    CLI::App* lee2000 = app.add_subcommand("lee2000", "the comparison of Lee and Kim 2000");
-    sim::Lee2000Options options;
+    sim::StudyOptions options;
     std::string out;
-    std::string scenarios;
     bool no_pictures = false;
     bool quiet = false;
-    lee2000->add_option("--runs", options.runs, "runs of each condition")->check(CLI::Range(2, 1'000'000));
-    lee2000->add_option("--seed", options.seed, "of the random numbers");
-    lee2000->add_option("--out", out, "directory of the results, made if missing")->required();
-    lee2000->add_option("--threads", options.run.threads, "default: all cores")->check(CLI::Range(1, 1024));
-    lee2000->add_option("--scenarios", scenarios, "directory of lee2000.json and the geometries it names");
-    lee2000->add_flag("--no-pictures", no_pictures, "tables only; gnuplot is not needed");
-    lee2000->add_flag("--quiet", quiet, "no progress on standard error");
+    std::array<CLI::App*, kStudies.size()> commands{};
+    for (std::size_t i = 0; i < kStudies.size(); ++i) {
+        CLI::App* command = commands[i] = app.add_subcommand(kStudies[i].name, kStudies[i].about);
+        command
+            ->add_option("--runs", options.runs,
+                         "runs of each condition; default " + std::to_string(kStudies[i].runs))
+            ->check(CLI::Range(2, 1'000'000));
+        command->add_option("--seed", options.seed, "of the random numbers");
+        command->add_option("--out", out, "directory of the results, made if missing")->required();
+        command->add_option("--threads", options.run.threads, "default: all cores")
+            ->check(CLI::Range(1, 1024));
+        command->add_flag("--no-pictures", no_pictures, "tables only; gnuplot is not needed");
+        command->add_flag("--quiet", quiet, "no progress on standard error");
+    }
     CLI11_PARSE(app, argc, argv);
     try {
         options.pictures = !no_pictures;
         options.run.directory = out;
-        options.scenarios = scenarios;
         options.run.show_progress = !quiet;
-        sim::run_lee2000(options, ranks);
+        for (std::size_t i = 0; i < kStudies.size(); ++i) {
+            if (!commands[i]->parsed()) continue;
+            if (options.runs == 0) options.runs = kStudies[i].runs;
+            kStudies[i].run(options, ranks);
+        }
         return 0;
     } catch (const std::exception& e) {
         std::fprintf(stderr, "radar_study: %s\n", e.what());

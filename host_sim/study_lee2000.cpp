@@ -20,8 +20,9 @@ std::string short_number(double v) {
     return text.data();
 }
 
-Plan read_plan(const std::filesystem::path& directory, std::uint64_t seed) {
+Plan read_plan(std::uint64_t seed) {
     Plan plan;
+    const auto directory = study_directory();
     const auto file = directory / (std::string(kName) + ".json");
     const nlohmann::json json = read_json_file(file);
     std::ostringstream configuration;
@@ -151,16 +152,10 @@ Scores collect(const Plan& plan, const std::vector<StudyFilter>& filters,
     return scores;
 }
 
-void write(const std::filesystem::path& file, const std::string& text) {
-    std::ofstream out(file);
-    if (!(out << text).flush()) throw InputError(file.string() + ": cannot be written");
-}
-
 }  // namespace
 
-void run_lee2000(const Lee2000Options& options, const StudyRanks& ranks) {
-    const Plan plan =
-        read_plan(options.scenarios.empty() ? study_directory() : options.scenarios, options.seed);
+void run_lee2000(const StudyOptions& options, const StudyRanks& ranks) {
+    const Plan plan = read_plan(options.seed);
     const std::vector<StudyFilter> filters = lee2000_filters();
     if (options.pictures && ranks.self().rank == 0) require_gnuplot();
 
@@ -177,10 +172,10 @@ void run_lee2000(const Lee2000Options& options, const StudyRanks& ranks) {
     const Tables tables = make_tables(plan, filters, scores);
     const std::string cost = cost_table(filters);
     std::printf("%s\n%s", tables.text.c_str(), cost.c_str());
-    write(directory / "lee2000.txt", tables.text);
-    write(directory / "lee2000_cost.txt", cost);
-    write(directory / "lee2000.csv", tables.csv);
-    write(directory / "lee2000.json", tables.json.dump(1) + "\n");
+    write_text(directory / "lee2000.txt", tables.text);
+    write_text(directory / "lee2000_cost.txt", cost);
+    write_text(directory / "lee2000.csv", tables.csv);
+    write_text(directory / "lee2000.json", tables.json.dump(1) + "\n");
     if (options.pictures) draw_pictures(directory, plan, filters, scores, options.seed);
     std::printf("\nTables, CSV, JSON and pictures are in %s\n", directory.c_str());
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "host_sim/study_filters.hpp"
+#include "host_sim/study_output.hpp"
 #include "host_sim/study_scenario.hpp"
 #include "host_sim/study_statistics.hpp"
 
@@ -67,14 +68,6 @@ Estimate over_runs(const Runs& runs, Value value) {
     std::vector<double> values;
     for (const RunScore& r : runs) values.push_back(value(r));
     return mean_of(values);
-}
-
-/// printf into a string; at most 511 characters.
-template <class... Values>
-std::string print(const char* format, Values... values) {
-    std::array<char, 512> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return text.data();
 }
 
 struct Tables {

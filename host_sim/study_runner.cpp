@@ -193,6 +193,15 @@ std::vector<char> StudyRanks::gather(const std::vector<char>& mine) const {
     return all;
 }
 
+std::vector<double> StudyRanks::spread(std::vector<double> values) const {
+    if (self_.size == 1) return values;
+    std::uint64_t size = values.size();
+    MPI_Bcast(&size, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+    values.resize(size);
+    MPI_Bcast(values.data(), static_cast<int>(size), MPI_DOUBLE, 0, MPI_COMM_WORLD);
+    return values;
+}
+
 #else
 
 StudyRanks::StudyRanks() = default;
@@ -200,6 +209,9 @@ StudyRanks::~StudyRanks() = default;
 void StudyRanks::give_up() const {}
 std::vector<char> StudyRanks::gather(const std::vector<char>& mine) const {
     return mine;
+}
+std::vector<double> StudyRanks::spread(std::vector<double> values) const {
+    return values;
 }
 
 #endif

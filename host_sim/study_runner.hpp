@@ -43,6 +43,8 @@ class StudyRanks {
     [[nodiscard]] StudyRank self() const { return self_; }
     /// The bytes of all processes, one after the other, on process 0; nothing elsewhere.
     [[nodiscard]] std::vector<char> gather(const std::vector<char>& mine) const;
+    /// What process 0 has, on all of them; all must call it.
+    [[nodiscard]] std::vector<double> spread(std::vector<double> values) const;
     /// Ends all processes, after an error in this one; returns when it is the only one.
     void give_up() const;
 

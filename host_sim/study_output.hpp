@@ -1,0 +1,33 @@
+/// What every study takes and writes.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "host_sim/study_runner.hpp"
+
+namespace sim {
+
+struct StudyOptions {
+    std::size_t runs = 0;  ///< of each condition
+    std::uint64_t seed = 1;
+    bool pictures = true;
+    StudyRunOptions run;
+};
+
+/// printf into a string; at most 1023 characters.
+template <class... Values>
+std::string print(const char* format, Values... values) {
+    std::array<char, 1024> text{};
+    std::snprintf(text.data(), text.size(), format, values...);
+    return text.data();
+}
+
+/// Throws InputError when the file cannot be written.
+void write_text(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace sim
