@@ -149,12 +149,12 @@ CollisionWarningResult<S> CollisionWarning<S>::step(std::span<const Track<S>> tr
 
         const S closing = -t.x[1];
         if (closing < config_.min_closing_mps) continue;
-        S time = t.x[0] / closing;
+        S time = t.x[0] * reciprocal(closing);
         if (time > S(kLimit)) time = S(kLimit);
         const S way = t.x[0] - config_.margin_m;
         S deceleration(kLimit);
         if (way > S(0)) {
-            deceleration = closing / way * closing * constant<S>(1, 2);
+            deceleration = closing * reciprocal(way) * closing * constant<S>(1, 2);
             if (deceleration > S(kLimit)) deceleration = S(kLimit);
         }
         const WarningLevel most = limit(m.motion);

@@ -59,10 +59,10 @@ struct TrackerConfig {
     /// format.
     S max_range_sigma_m = S(10);
 
-    S merge_distance2 =
-        S(1);  ///< tracks nearer than this (in their joint covariance) cannot be told apart ...
-    std::uint8_t merge_frames = 10;  ///< ... and after this many frames in a row the younger is dropped
-    S replace_margin_db = S(3);      ///< by how much stronger a track must be to take a confirmed one's place
+    /// Tracks nearer than this, in the accuracy of a measurement of one of them, cannot be told apart ...
+    S merge_distance2 = constant<S>(1, 4);
+    std::uint8_t merge_frames = 20;  ///< ... and after this many frames in a row the younger is dropped
+    S replace_margin_db = S(6);      ///< by how much stronger a track must be to take a confirmed one's place
 
     [[nodiscard]] constexpr bool valid() const {
         return motion.valid() && gate.valid() && order_statistics.valid() && associator <= kLastAssociator &&
@@ -338,7 +338,7 @@ void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
     for (const Candidate<S>& c : row.candidates()) {
         if (main == nullptr || c.weight > main->weight) main = &c;
     }
-    track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 4);
+    track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 8);
 }
 
 /// The track two measurements make if their range rates agree, and for one of the possible folds their range
@@ -486,25 +486,26 @@ void Tracker<S>::confirm(TrackerReport& report) {
     erase_free();
 }
 
-/// Two tracks of one target end up at the same place and stay there. Targets that pass each other do so for a
-/// few frames, and a coasting track is too uncertain to judge: hence the count. The younger goes, so that the
-/// id a consumer knows survives; a tentative track always gives way to a confirmed one.
+/// Two tracks of one target end up in the same state and stay there; targets that pass each other are there
+/// for a few frames at most, hence the count. "The same" is what a measurement of the other could not tell
+/// apart: the wide covariance of a coasting track proves nothing. Of the two the coasting one goes, else the
+/// younger, so that the id a consumer knows survives; a tentative track always gives way to a confirmed one.
 template <class S>
 void Tracker<S>::merge(TrackerReport& report) {
-    constexpr std::uint8_t kTooUncertain = 3;
-    for (std::size_t younger = 0; younger < static_cast<std::size_t>(count_); ++younger) {
-        Track<S>& b = track_[younger];
+    constexpr std::uint8_t kCoasting = 3;  // misses in a row
+    const Vec2<S> least = gate_.noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, false);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        Track<S>& b = track_[i];
         bool same = false;
-        for (std::size_t i = 0; i < static_cast<std::size_t>(count_) && !same; ++i) {
-            const Track<S>& a = track_[i];
-            if (i == younger || a.state == TrackState::free || a.misses >= kTooUncertain ||
-                b.misses >= kTooUncertain)
-                continue;
-            if (b.is_confirmed() ? (!a.is_confirmed() || i > younger) : (!a.is_confirmed() && i > younger))
-                continue;
+        for (std::size_t j = 0; j < static_cast<std::size_t>(count_) && !same; ++j) {
+            const Track<S>& a = track_[j];
+            if (i == j || a.state == TrackState::free || a.misses >= kCoasting) continue;
+            const bool yields =
+                a.is_confirmed() == b.is_confirmed() ? j < i || b.misses >= kCoasting : a.is_confirmed();
+            if (!yields) continue;
             const Vec2<S> d(a.x[0] - b.x[0], a.x[1] - b.x[1]);
-            const Ldl<S> joint(Mat2<S>(a.covariance + b.covariance));
-            same = joint.valid() && joint.distance2(d) < config_.merge_distance2;
+            const Ldl<S> accuracy(innovation_covariance(a.covariance, least));
+            same = accuracy.valid() && accuracy.distance2(d) < config_.merge_distance2;
         }
         b.overlap = same ? static_cast<std::uint8_t>(b.overlap + 1) : std::uint8_t{0};
         if (b.overlap < config_.merge_frames) continue;

@@ -314,7 +314,7 @@ TEST(Tracker, OverCapacityKeepsTheStrongestAndCounts) {
     CHECK(dropped > 0);
     LONGS_EQUAL(kMaxConfirmed, confirmed(tracker.tracks()));
     for (const auto& t : tracker.tracks()) {
-        if (t.is_confirmed()) CHECK(t.snr_db >= Real(49 - kMaxConfirmed + 1 - 3));  // replace_margin_db
+        if (t.is_confirmed()) CHECK(t.snr_db >= Real(49 - kMaxConfirmed + 1 - 6));  // replace_margin_db
     }
 }
 
