@@ -11,28 +11,30 @@ namespace dsp {
 namespace {
 constexpr int kMeanBits = 6;  // kSamples = 64: 64 x - sum is the deviation with 6 fraction bits
 static_assert(kSamples == 1 << kMeanBits);
+constexpr int kLowestExponent = -15;
 }  // namespace
 
 DcLevels dc_levels(const BeatFrame& frame) {
     DcLevels levels;
-    std::int32_t largest = 0;
-    for (std::size_t k = 0; k < kChirps; ++k) {
-        std::int32_t sum = 0;
-        std::int32_t low = frame.chirp[k][0];
-        std::int32_t high = low;
-        for (const std::int32_t sample : frame.chirp[k]) {
-            sum += sample;
-            low = std::min(low, sample);
-            high = std::max(high, sample);
+    for (std::size_t pair = 0; pair < kChirps / 2; ++pair) {
+        std::int32_t largest = 0;  // Q6
+        for (std::size_t k = 2 * pair; k < 2 * pair + 2; ++k) {
+            std::int32_t sum = 0;
+            std::int32_t low = frame.chirp[k][0];
+            std::int32_t high = low;
+            for (const std::int32_t sample : frame.chirp[k]) {
+                sum += sample;
+                low = std::min(low, sample);
+                high = std::max(high, sample);
+            }
+            levels.sum[k] = sum;
+            largest = std::max({largest, kSamples * high - sum, sum - kSamples * low});
         }
-        levels.sum[k] = sum;
-        largest = std::max({largest, kSamples * high - sum, sum - kSamples * low});
+        const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest)));
+        int down = std::max(bits - 15, kLowestExponent + kMeanBits);
+        if (down > 0 && round_shift(largest, down) > 32767) ++down;
+        levels.exponent[pair] = static_cast<std::int16_t>(down - kMeanBits);
     }
-    if (largest == 0) return levels;
-    // The largest deviation, Q6, becomes a 15-bit number; one bit of it is given away so that rounding up
-    // from 32767.5 needs no care.
-    const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest) + (1U << 6)));
-    levels.exponent = std::max(bits - 15 - kMeanBits, -14);
     return levels;
 }
 

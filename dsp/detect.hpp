@@ -29,9 +29,10 @@ struct DspConfig {
 };
 static_assert(DspConfig{}.valid());
 
-/// All memory the signal processing needs besides the frame, about 13 KiB. `map` is valid after detect().
+/// All memory the signal processing needs besides the frame, about 13 KiB. `map`, `spectrum` and `peaks` are
+/// those of the frame after detect().
 struct Workspace {
-    RangeSpectra spectra;
+    Spectrum spectrum;
     PowerMap map;
     CellMask peaks;
     CandidateList candidates;

@@ -91,6 +91,7 @@ constexpr void fft8(std::array<Complex32, 8>& x) {
 
 /// 2^15 * 2^9 * 64 * sqrt 2 < 2^31: the widest that cannot overflow, even for full-scale corners.
 constexpr int kGuardBits = 9;
+constexpr int kLowestExponent = -15;
 
 }  // namespace
 
@@ -118,14 +119,14 @@ int fft64(std::span<Complex16, kFftLength> data, int bits) {
     }
     if (magnitude == 0) {
         std::ranges::fill(data, Complex16{});
-        return 0;
+        return kLowestExponent;
     }
     const auto width = static_cast<int>(std::bit_width(magnitude));
     const int shift = width - bits;
     for (std::size_t i = 0; i < kFftLength; ++i) {
         const Complex32 x = work[i / 8][i % 8];
         if (shift > 0) {
-            // Rounding up from the very top would need one bit more: it saturates, half a step low.
+            // Rounding up from the very top would need one bit more: it saturates, less than one step low.
             const std::int32_t top = (1 << bits) - 1;
             data[i] = {static_cast<std::int16_t>(std::min(round_shift(x.re, shift), top)),
                        static_cast<std::int16_t>(std::min(round_shift(x.im, shift), top))};

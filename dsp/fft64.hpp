@@ -25,7 +25,7 @@ using Spectrum64 = std::array<Complex16, kFftLength>;
 /// fraction bits, so nothing can overflow (growth at most 64 * sqrt 2) and the only rounding that matters is
 /// the last one, half to even, to the exponent at which the largest component of this block takes `bits`
 /// magnitude bits: the precision does not depend on the level of the input. 1 <= bits <= 15; the exponent is
-/// -9..7 for 15 bits and one more for each bit less. All-zero input gives zeros and exponent 0.
+/// -15..7 for 15 bits and one more for each bit less. All-zero input gives zeros and exponent -15.
 int fft64(std::span<Complex16, kFftLength> data, int bits = 15);
 
 /// Transforms two real sequences with one complex transform of z = a + j b: for the lower half of the cells

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "dsp/fixed_point.hpp"
+
 namespace dsp {
 
 /// Fraction bits of every base-2 logarithm in this room: Q6.10, one step is 0.00294 dB of power.
@@ -81,19 +83,23 @@ constexpr std::int32_t log2_q10(std::uint32_t v) {
     return octave * kLogOne + static_cast<std::int32_t>((fraction + (1U << 5)) >> 6);
 }
 
-/// 2^(x/1024) in Q15 for x <= 0, as a factor in [0, 1]; relative error below 1e-4 down to 2^-15. Below that,
-/// 0.
-constexpr std::uint32_t exp2_q15(std::int32_t x) {
+/// 2^(x/1024) in Q30 for x <= 0; relative error below 1e-4 or one unit of the last place. Zero below 2^-31.
+constexpr std::uint32_t exp2_q30(std::int32_t x) {
     const std::int32_t octave = x >> kLogBits;  // floor
-    if (octave < -16) return 0;
+    if (octave < -31) return 0;
     const auto fraction = static_cast<std::uint32_t>(x) & (kLogOne - 1);
-    const std::uint32_t index = fraction >> (kLogBits - detail::kTableBits);
-    const std::uint32_t rest = fraction & ((1U << (kLogBits - detail::kTableBits)) - 1);
+    constexpr int kRestBits = kLogBits - detail::kTableBits;
+    const std::uint32_t index = fraction >> kRestBits;
+    const std::uint32_t rest = fraction & ((1U << kRestBits) - 1);
     const std::uint32_t base = detail::kExp2Table[index];
     const std::uint32_t step = detail::kExp2Table[index + 1] - base;
-    const std::uint32_t value = (base << 5) + step * rest;  // Q20 in [1, 2]
-    const int shift = 5 - octave;
-    return (value + (1U << (shift - 1))) >> shift;
+    return ((base << kRestBits) + step * rest) << (30 - 15 - kRestBits) >> -octave;
+}
+
+/// Hundredths of a decibel to log2 of power, Q6.10, rounded: one decibel is 102.4 log2(10) = 340.17 steps.
+constexpr std::int32_t log2_from_cdb(std::int32_t hundredths) {
+    constexpr std::int64_t kStepsPerCdbQ16 = 222'931;
+    return static_cast<std::int32_t>(round_shift(hundredths * kStepsPerCdbQ16, 16));
 }
 
 }  // namespace dsp

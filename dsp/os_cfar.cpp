@@ -11,7 +11,7 @@ namespace dsp {
 
 namespace {
 
-/// log2(v / 2^20) in Q20 for v >= 2^20, exact to its last place.
+/// log2(v / 2^20) in Q20 for v > 0, exact to its last place but one.
 std::int64_t log2_q20(std::uint64_t v) {
     const int octave = static_cast<int>(std::bit_width(v)) - 1;
     const auto mantissa = static_cast<std::uint32_t>(octave >= 30 ? v >> (octave - 30) : v << (30 - octave));
@@ -35,9 +35,7 @@ std::int32_t os_cfar_alpha(int cells, int rank, std::int32_t false_alarm_ppb) {
         }
         (sum < wanted ? low : high) = alpha;
     }
-    // Bits below Q20 are gone for alpha < 1 as well: add 1 octave of 20 and take it off again.
-    return static_cast<std::int32_t>(
-        round_shift(log2_q20(high << 20) - 20 * (std::int64_t{1} << 20), 20 - kLogBits));
+    return static_cast<std::int32_t>(round_shift(log2_q20(high), 20 - kLogBits));
 }
 
 std::int32_t os_cfar_noise_offset(int cells, int rank) {
@@ -52,11 +50,10 @@ namespace {
 /// Calls `visit(log_power)` for the reference cells of a cell until it returns false.
 template <class Visit>
 void for_each_reference(const PowerMap& map, const CfarConfig& config, int r, int d, Visit visit) {
-    const auto& row = map.cell[static_cast<std::size_t>(r)];
     for (int i = 0; i < config.doppler_reference; ++i) {
         const int distance = config.doppler_guard + 1 + config.spacing * i;
-        if (!visit(row[static_cast<std::size_t>((d + distance) % kDopplerCells)])) return;
-        if (!visit(row[static_cast<std::size_t>((d - distance + kDopplerCells) % kDopplerCells)])) return;
+        if (!visit(map.at(r, d + distance))) return;
+        if (!visit(map.at(r, d - distance))) return;
     }
     // Range cells in order of distance, both sides in turn; a side that has ended leaves its share to the
     // other, so N is the same everywhere.
@@ -65,11 +62,11 @@ void for_each_reference(const PowerMap& map, const CfarConfig& config, int r, in
         const int distance = config.range_guard + 1 + config.spacing * i;
         if (r + distance < kRangeCells) {
             --remaining;
-            if (!visit(map.cell[static_cast<std::size_t>(r + distance)][static_cast<std::size_t>(d)])) return;
+            if (!visit(map.at(r + distance, d))) return;
         }
         if (remaining > 0 && r - distance >= config.first_range_cell) {
             --remaining;
-            if (!visit(map.cell[static_cast<std::size_t>(r - distance)][static_cast<std::size_t>(d)])) return;
+            if (!visit(map.at(r - distance, d))) return;
         }
     }
 }
@@ -78,14 +75,12 @@ void for_each_reference(const PowerMap& map, const CfarConfig& config, int r, in
 
 OsCfar::OsCfar(const CfarConfig& config)
     : config_(config),
-      // 1 cdB is 3.4015 steps of Q6.10: log2(10)/10 * 1024 / 100.
       threshold_(os_cfar_alpha(config.reference_cells(), config.rank, config.false_alarm_ppb) +
-                 round_divide<std::int32_t>(config.offset_cdb * 34'015, 10'000)),
+                 log2_from_cdb(config.offset_cdb)),
       noise_offset_(os_cfar_noise_offset(config.reference_cells(), config.rank)) {}
 
 bool OsCfar::detects(const PowerMap& map, int range_cell, int doppler_cell) const {
-    const std::uint16_t power =
-        map.cell[static_cast<std::size_t>(range_cell)][static_cast<std::size_t>(doppler_cell)];
+    const std::int32_t power = map.at(range_cell, doppler_cell);
     if (power == 0) return false;
     const std::int32_t limit = power - threshold_;
     int may_exceed = config_.reference_cells() - config_.rank;
@@ -111,23 +106,16 @@ std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell
 void local_maxima(const PowerMap& map, int first_range_cell, CellMask& maxima) {
     maxima = CellMask{};
     for (int r = first_range_cell; r < kRangeCells; ++r) {
-        const auto& row = map.cell[static_cast<std::size_t>(r)];
         for (int d = 0; d < kDopplerCells; ++d) {
-            const std::uint16_t x = row[static_cast<std::size_t>(d)];
-            const auto left = static_cast<std::size_t>((d - 1) & (kDopplerCells - 1));
-            const auto right = static_cast<std::size_t>((d + 1) & (kDopplerCells - 1));
+            const std::uint16_t x = map.at(r, d);
             // Left is earlier in memory and may be equal, right is later and may not; the ends wrap around.
-            if (d == 0 ? row[left] >= x : row[left] > x) continue;
-            if (d == kDopplerCells - 1 ? row[right] > x : row[right] >= x) continue;
-            if (r > first_range_cell) {
-                const auto& before = map.cell[static_cast<std::size_t>(r - 1)];
-                if (before[left] > x || before[static_cast<std::size_t>(d)] > x || before[right] > x)
-                    continue;
-            }
-            if (r + 1 < kRangeCells) {
-                const auto& after = map.cell[static_cast<std::size_t>(r + 1)];
-                if (after[left] >= x || after[static_cast<std::size_t>(d)] >= x || after[right] >= x)
-                    continue;
+            if (d == 0 ? map.at(r, d - 1) >= x : map.at(r, d - 1) > x) continue;
+            if (d == kDopplerCells - 1 ? map.at(r, d + 1) > x : map.at(r, d + 1) >= x) continue;
+            if (r > 0 && (map.at(r - 1, d - 1) > x || map.at(r - 1, d) > x || map.at(r - 1, d + 1) > x))
+                continue;
+            if (r + 1 < kRangeCells &&
+                (map.at(r + 1, d - 1) >= x || map.at(r + 1, d) >= x || map.at(r + 1, d + 1) >= x)) {
+                continue;
             }
             maxima.set(r, d);
         }

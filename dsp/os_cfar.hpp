@@ -17,21 +17,23 @@ struct CellMask {
     constexpr void set(int r, int d) { row[static_cast<std::size_t>(r)] |= std::uint64_t{1} << d; }
 };
 
-/// The reference cells form a cross around the cell under test: arms along Doppler (cyclic) and along range.
-/// Arms in one direction only would let a ridge of stationary clutter (one Doppler column) or cars driving at
-/// one velocity mask each other; with a cross they reach only the arm they lie on, and a rank near the middle
-/// tolerates one arm lost.
+/// The reference cells form a cross around the cell under test: arms along Doppler (cyclic) and short ones
+/// along range. Along range alone a ridge of stationary clutter (one Doppler column) or cars at one velocity
+/// mask each other, along Doppler alone cars at one range do. With a cross they reach only the arm they lie
+/// on, and a rank below the usual 3N/4 tolerates that arm lost; it costs 0.3 dB. Measured with four cars in
+/// one row 15 dB apart, five in one column 20 dB apart, and a car 4 cells beside a ridge: this default finds
+/// the weak one always, N = 16, k = 12 along Doppler never in the row and in 85 % beside the ridge.
 struct CfarConfig {
-    std::int8_t doppler_guard = 2;      ///< cells left out on each side, 0..8: half the main lobe
-    std::int8_t doppler_reference = 6;  ///< reference cells on each side, 0..16
-    std::int8_t range_guard = 2;        ///< as above, 0..8
-    std::int8_t range_reference =
+    std::int16_t doppler_guard = 2;      ///< cells left out on each side, 0..8: half the main lobe
+    std::int16_t doppler_reference = 8;  ///< reference cells on each side, 0..16
+    std::int16_t range_guard = 2;        ///< as above, 0..8
+    std::int16_t range_reference =
         2;  ///< 0..8; at the ends of the map the missing ones come from the other side
     /// Distance of reference cells from one another, 1..2. Neighbours of a windowed spectrum are correlated
     /// (Hann: 0.44 in power); at every second cell they are as good as independent, as the threshold assumes.
-    std::int8_t spacing = 2;
-    std::int8_t rank = 9;  ///< k of the k-th smallest of all N; higher: less loss, masks sooner. 1..N
-    std::int8_t first_range_cell = 2;        ///< cells below it hold leakage: neither tested nor used. 0..8
+    std::int16_t spacing = 2;
+    std::int16_t rank = 12;  ///< k of the k-th smallest of all N; higher: less loss, masks sooner. 1..N
+    std::int16_t first_range_cell = 2;       ///< cells below it hold leakage: neither tested nor used. 0..8
     std::int32_t false_alarm_ppb = 100'000;  ///< design Pfa of a cell in 1e-9, 1'000..100'000'000
     std::int16_t offset_cdb = 0;             ///< added to the threshold, hundredths of a decibel, -300..2000
 
@@ -84,8 +86,9 @@ class OsCfar {
     std::int32_t noise_offset_;
 };
 
-/// Cells that are larger than their eight neighbours (Doppler cyclic, range ending at `first_range_cell` and
-/// at the last row). Of equal neighbours the one later in memory is larger, so a plateau gives one maximum.
+/// Cells from `first_range_cell` on that are larger than their eight neighbours (Doppler cyclic). The row
+/// below is a neighbour too: the flank of the leakage is no maximum. Of equal neighbours the one later in
+/// memory is larger, so a plateau gives one maximum.
 void local_maxima(const PowerMap& map, int first_range_cell, CellMask& maxima);
 
 /// Tests the cells in `candidates` and writes those over threshold to `hits`. All cells or local maxima only,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -12,12 +13,14 @@
 
 namespace dsp {
 
-/// Range spectra of all chirps, one row a range cell, so that the second transform walks memory forward.
-struct RangeSpectra {
+/// Spectra with one row a range cell, so that the second transform walks memory forward. First of range for
+/// each chirp, [range][chirp]; the second transform replaces each row in place by [range][Doppler].
+struct Spectrum {
     std::array<std::array<Complex16, kChirps>, kRangeCells> row;
-    /// Of chirps 2i and 2i+1: value = row * 2^exponent, in converter codes. A burst of interference costs
-    /// precision only in the chirps it hits.
-    std::array<std::int8_t, kChirps / 2> exponent;
+    /// Of chirps 2i and 2i+1 before the second transform: value = row * 2^exponent, in converter codes. A
+    /// burst of interference costs precision only in the chirps it hits.
+    std::array<std::int16_t, kChirps / 2> chirp_exponent;
+    std::array<std::int16_t, kRangeCells> row_exponent;  ///< of each row after the second transform
 };
 
 /// log2 of the power of each cell, Q6.10: log2 |sum of w x exp(..)|^2 over the windowed samples in converter
@@ -26,19 +29,28 @@ struct RangeSpectra {
 /// 54.0.
 struct PowerMap {
     std::array<std::array<std::uint16_t, kDopplerCells>, kRangeCells> cell;  ///< Doppler cell 0: standstill
+
+    /// Doppler cells repeat every kDopplerCells.
+    [[nodiscard]] constexpr std::uint16_t at(int range, int doppler) const {
+        return cell[static_cast<std::size_t>(range)]
+                   [static_cast<std::size_t>(doppler) & (std::size_t{kDopplerCells} - 1)];
+    }
 };
 
 /// DC removal, window and range transform, two chirps at a time. The window is Q15.
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
-                     RangeSpectra& spectra);
+                     Spectrum& spectrum);
 
-/// Window and transform over the chirps of one range cell, log-power of the result. Each row has its own
-/// exponent, from its own largest sample.
-void doppler_transform(const RangeSpectra& spectra, const Window& window, int range_cell,
-                       std::span<std::uint16_t, kDopplerCells> log_power);
+/// Window and transform over the chirps of one range cell, in place. Each row has its own exponent, from its
+/// own largest sample.
+void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell);
 
-/// All of it.
+/// One row of the map from one row of the spectrum.
+void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
+               std::span<std::uint16_t, kDopplerCells> power);
+
+/// All of it, DC levels included.
 void range_doppler(const BeatFrame& frame, WindowKind range_window, WindowKind doppler_window,
-                   RangeSpectra& spectra, PowerMap& map);
+                   Spectrum& spectrum, PowerMap& map);
 
 }  // namespace dsp

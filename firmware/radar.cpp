@@ -43,7 +43,8 @@ void Radar::reset_state() {
     tracker_.configure(config_.tracker);
     collision_.reset();
     health_ = Health(config_.health);
-    // After a restart nothing may depend on what the bus said before: whoever sent the command starts anew too.
+    // After a restart nothing may depend on what the bus said before: whoever sent the command starts anew
+    // too.
     receiver_ = can::Receiver{};
     transmitter_ = {};
     warning_ = {};
@@ -82,11 +83,7 @@ void Radar::begin_cycle() {
     next_start_us_ += period_us_;
     board_.can.begin_cycle();
     read_bus();
-    if (restart_due_) {
-        const can::CommandEcho echo = echo_;
-        reset_state();
-        echo_ = echo;
-    }
+    if (restart_due_) reset_state();
 }
 
 void Radar::read_bus() {
@@ -104,10 +101,7 @@ void Radar::read_bus() {
             case can::command::kMessage.id: {
                 can::Command command;
                 if (can::is_good(receiver_.receive(frame, command))) {
-                    const can::CommandResult result = apply(command);
-                    echo_ = {command.code, result, command.sequence, value_in_force(command.code)};
-                    echo_due_ = true;
-                    if (result != can::CommandResult::applied) ++counters_.commands_refused;
+                    answer(command);
                 }
                 break;
             }
@@ -115,6 +109,17 @@ void Radar::read_bus() {
                 receiver_.ignore();
         }
     }
+}
+
+void Radar::answer(const can::Command& command) {
+    if (echoes_ == echo_.size()) {
+        // Nothing is done that could not be answered.
+        ++counters_.commands_refused;
+        return;
+    }
+    const can::CommandResult result = apply(command);
+    if (result != can::CommandResult::applied) ++counters_.commands_refused;
+    echo_[echoes_++] = {command.code, result, command.sequence, value_in_force(command.code)};
 }
 
 can::CommandResult Radar::apply(const can::Command& command) {
@@ -256,10 +261,8 @@ void Radar::publish() {
 
     publish_objects(valid);
 
-    if (echo_due_) {
-        send(transmitter_.frame(echo_));
-        echo_due_ = false;
-    }
+    for (std::size_t i = 0; i < echoes_; ++i) send(transmitter_.frame(echo_[i]));
+    echoes_ = 0;
     if (counters_.cycles % kVersionEveryCycles == 1) {
         send(transmitter_.frame(can::Version{.major = kVersionMajor,
                                              .minor = kVersionMinor,

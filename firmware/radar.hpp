@@ -1,6 +1,8 @@
 /// The application: one object, one call a period. Everything it needs of the world comes through hal::Board.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -43,6 +45,9 @@ struct RadarCounters {
     std::uint32_t commands_refused = 0;
 };
 
+/// Commands answered in one cycle; more are refused and counted.
+inline constexpr std::size_t kMaxCommandsPerCycle = 4;
+
 class Radar {
   public:
     /// `config` must be valid().
@@ -70,6 +75,7 @@ class Radar {
   private:
     void begin_cycle();
     void read_bus();
+    void answer(const can::Command& command);
     [[nodiscard]] can::CommandResult apply(const can::Command& command);
     [[nodiscard]] std::int32_t value_in_force(can::CommandCode code) const;
     void acquire_and_detect();
@@ -97,8 +103,8 @@ class Radar {
     can::Receiver receiver_{};
     can::Transmitter transmitter_{};
     tracking::CollisionWarningResult<Real> warning_{};
-    can::CommandEcho echo_{};
-    bool echo_due_ = false;
+    std::array<can::CommandEcho, kMaxCommandsPerCycle> echo_{};
+    std::size_t echoes_ = 0;
     bool restart_due_ = false;
     int ego_speed_mmps_ = 0;
     std::uint8_t cycle_ = 0;

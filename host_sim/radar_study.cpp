@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     sim::StudyOptions options;
     std::string out;
+    std::string scenarios;
     bool no_pictures = false;
     bool quiet = false;
     std::array<CLI::App*, kStudies.size()> commands{};
@@ -62,6 +63,9 @@ int main(int argc, char** argv) {
         command->add_option("--out", out, "directory of the results, made if missing")->required();
         command->add_option("--threads", options.run.threads, "default: all cores")
             ->check(CLI::Range(1, 1024));
+        if (kStudies[i].run == sim::run_lee2000)
+            command->add_option("--scenarios", scenarios,
+                                "directory of lee2000.json and the geometries it names");
         command->add_flag("--no-pictures", no_pictures, "tables only; gnuplot is not needed");
         command->add_flag("--quiet", quiet, "no progress on standard error");
     }
@@ -69,6 +73,7 @@ int main(int argc, char** argv) {
     try {
         options.pictures = !no_pictures;
         options.run.directory = out;
+        options.scenarios = scenarios;
         options.run.show_progress = !quiet;
         for (std::size_t i = 0; i < kStudies.size(); ++i) {
             if (!commands[i]->parsed()) continue;

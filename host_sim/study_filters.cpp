@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <memory>
 
 #include "host_sim/assignment.hpp"
 #include "tracking/gating.hpp"
@@ -202,7 +201,7 @@ StudyResult run_study_filter(const StudyFilter& filter, const StudyGeometry& geo
     tracking::MotionModel<S> motion;
     motion.period_s = scalar<S>(condition.period_s);
     const auto order = order_as<S>(filter.order);
-    static thread_local auto work = std::make_unique<tracking::JpdaWorkspace<S>>();
+    static thread_local tracking::JpdaWorkspace<S> work;
 
     std::vector<State> track(targets);
     for (std::size_t t = 0; t < targets; ++t) {
@@ -240,7 +239,7 @@ StudyResult run_study_filter(const StudyFilter& filter, const StudyGeometry& geo
             }
             gate.fill(rows[t], track[t].x, track[t].covariance, near.value, ~std::uint64_t{0}, obscured);
         }
-        tracking::associate<S>(rows, filter.associator, order, *work);
+        tracking::associate<S>(rows, filter.associator, order, work);
 
         std::vector<Vec2d>& estimate = result.estimate.emplace_back();
         for (std::size_t t = 0; t < targets; ++t) {
@@ -296,8 +295,12 @@ std::vector<StudyFilter> lee2000_filters() {
     filters.push_back({"ospda/optimal", Associator::ospda, order});
     order.reduction = Reduction::soft;
     filters.push_back({"ospda/soft", Associator::ospda, order});
-    filters.push_back({"ospda", Associator::ospda, {}});
-    filters.push_back({"osjpda", Associator::osjpda, {}});
+    order.reduction = Reduction::exclusive;
+    order.covariance = CovarianceBetas::decided;
+    filters.push_back({"ospda/decided", Associator::ospda, order});
+    const auto radar = TrackerConfig<double>{}.order_statistics;
+    filters.push_back({"ospda", Associator::ospda, radar});
+    filters.push_back({"osjpda", Associator::osjpda, radar});
     return filters;
 }
 

@@ -52,8 +52,8 @@ template <class S>
 StudyResult run_study_filter(const StudyFilter& filter, const StudyGeometry& geometry,
                              const StudyCondition& condition, const StudyRun& run);
 
-/// The filters of Lee and Kim 2000 as printed; then the steps from there to the default form of OSPDA and
-/// OSJPDA, which have the plain names.
+/// The filters of Lee and Kim 2000 as printed, with alpha in brackets; then the steps from there to the form
+/// the radar uses, which has the plain names ospda and osjpda.
 std::vector<StudyFilter> lee2000_filters();
 
 }  // namespace sim

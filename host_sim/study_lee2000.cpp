@@ -20,9 +20,8 @@ std::string short_number(double v) {
     return text.data();
 }
 
-Plan read_plan(std::uint64_t seed) {
+Plan read_plan(const std::filesystem::path& directory, std::uint64_t seed) {
     Plan plan;
-    const auto directory = study_directory();
     const auto file = directory / (std::string(kName) + ".json");
     const nlohmann::json json = read_json_file(file);
     std::ostringstream configuration;
@@ -155,7 +154,8 @@ Scores collect(const Plan& plan, const std::vector<StudyFilter>& filters,
 }  // namespace
 
 void run_lee2000(const StudyOptions& options, const StudyRanks& ranks) {
-    const Plan plan = read_plan(options.seed);
+    const Plan plan =
+        read_plan(options.scenarios.empty() ? study_directory() : options.scenarios, options.seed);
     const std::vector<StudyFilter> filters = lee2000_filters();
     if (options.pictures && ranks.self().rank == 0) require_gnuplot();
 

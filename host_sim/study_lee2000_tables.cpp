@@ -239,7 +239,7 @@ class Report {
         out << improvement_claim("pda", "ospda(4)", 18) << improvement_claim("jpda", "osjpda(6)", 19)
             << improvement_claim("pda", "ospda", 18) << improvement_claim("jpda", "ospda", 0);
 
-        out << "\nThe default OSPDA: at most half of PDA's losses, and at most 2 points more than exact "
+        out << "\nThe radar's OSPDA: at most half of PDA's losses, and at most 2 points more than exact "
                "JPDA\n"
             << print("  %-32s%14s%14s%14s%26s%26s\n", "", "PDA lost %", "JPDA lost %", "OSPDA lost %",
                      "fewer than PDA, points", "fewer than JPDA, points");

@@ -16,6 +16,7 @@ struct StudyOptions {
     std::size_t runs = 0;  ///< of each condition
     std::uint64_t seed = 1;
     bool pictures = true;
+    std::filesystem::path scenarios;  ///< of studies that read some; empty: the shipped ones
     StudyRunOptions run;
 };
 

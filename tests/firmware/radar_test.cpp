@@ -26,6 +26,7 @@ struct Heard {
     std::array<can::Object, can::kMaxObjects> object{};
     int kinematics = 0;
     int quality = 0;
+    int echoes = 0;
     int rejected = 0;
 };
 
@@ -74,6 +75,7 @@ class Rig {
                     break;
                 case 0x403:
                     read(frame, h.echo);
+                    ++h.echoes;
                     break;
                 case 0x410:
                     read(frame, h.header);
@@ -232,6 +234,20 @@ TEST(Radar, CommandsAreValidatedAppliedAndEchoed) {
     LONGS_EQUAL(1, h.header->count);
     h = rig.command(can::CommandCode::reset_tracks, 0);
     LONGS_EQUAL(0, h.header->count);
+}
+
+TEST(Radar, AnswersSeveralCommandsOfOneCycle) {
+    Rig rig;
+    rig.cycles(10);
+    for (int i = 0; i < 6; ++i) {
+        const can::Command command{can::CommandCode::set_min_snr, static_cast<std::uint8_t>(i), 100 * i};
+        rig.fake.can.to_radar.push_back(rig.fake.car.frame(command));
+    }
+    const Heard h = rig.cycle();
+    LONGS_EQUAL(4, h.echoes);
+    LONGS_EQUAL(300, h.echo->value);
+    LONGS_EQUAL(2, rig.radar().counters().commands_refused);
+    LONGS_EQUAL(300, rig.radar().config().dsp.peaks.min_snr_cdb);
 }
 
 TEST(Radar, RestartBeginsAgainAtCycleZero) {

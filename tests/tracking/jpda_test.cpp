@@ -326,6 +326,29 @@ TEST(Jpda, LargestExactClusterAndTheFirstPastIt) {
     LONGS_EQUAL(0, associate(few).approximated);
 }
 
+TEST(Jpda, FixedPointHoldsAtFullCapacity) {
+    // 8 tracks, 12 shared measurements, the most joint events there can be; listing 3e8 of them takes
+    // minutes, so the reference is the recursion in double, which is checked against events above.
+    std::mt19937 random(7);
+    double worst = 0.0;
+    for (const double spread : {0.0, 1.0, 4.0, 12.0, 30.0}) {
+        for (int i = 0; i < 5; ++i) {
+            Rows rows = random_rows(random, {8, 12, 1.0, spread, -2.3});
+            auto fixed = to_fixed(rows);
+            LONGS_EQUAL(0, associate(rows).approximated);
+            LONGS_EQUAL(0, associate(fixed).approximated);
+            for (std::size_t t = 0; t < rows.size(); ++t) {
+                worst = std::max(worst, std::abs(rows[t].missed - to_double(fixed[t].missed)));
+                for (std::size_t c = 0; c < 12; ++c)
+                    worst =
+                        std::max(worst, std::abs(rows[t].item[c].beta - to_double(fixed[t].item[c].beta)));
+            }
+            CHECK(worst_row_sum(fixed) <= 1e-3);
+        }
+    }
+    CHECK(worst <= 2e-3);
+}
+
 TEST(Jpda, ApproximationOfLargeClustersIsCloserToTheEventsThanPda) {
     // A convoy: ten tracks, each in reach of three measurements, two of them shared with the neighbours.
     std::mt19937 random(5);

@@ -66,7 +66,7 @@ void follows_one_target() {
         const std::array<Measurement<S>, 1> m{at<S>(10000 - 100 * frame, -1000)};
         const auto report = tracker.step(m);
         LONGS_EQUAL(frame == 1 ? 1 : 0, report.initiated);
-        LONGS_EQUAL(frame == 2 ? 1 : 0, report.confirmed);
+        LONGS_EQUAL(frame == 3 ? 1 : 0, report.confirmed);
         LONGS_EQUAL(frame == 0 ? 0 : 1, tracker.tracks().size());
     }
     const auto& t = tracker.tracks()[0];
@@ -286,7 +286,7 @@ TEST(Tracker, IdsAreNotGivenAgainUntilAllOthersWere) {
     for (int round = 0; round < 300; ++round) {
         for (int frame = 0; frame < 14; ++frame) {
             std::vector<Measurement<Real>> m{at<Real>(12000, 0)};
-            if (frame < 3) m.push_back(at<Real>(3000 + 20 * (round % 20), 0));
+            if (frame < 4) m.push_back(at<Real>(3000 + 20 * (round % 20), 0));
             const auto report = tracker.step(m);
             if (report.confirmed > 0 && tracker.tracks().size() == 2) ids.push_back(tracker.tracks()[1].id);
         }

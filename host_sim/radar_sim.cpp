@@ -1,0 +1,186 @@
+// The firmware on a PC, in a simulated or recorded world. Parses, runs, prints; everything else is in the
+// library.
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <optional>
+#include <string>
+
+#include "host_sim/live_view.hpp"
+#include "host_sim/plots.hpp"
+#include "host_sim/simulation.hpp"
+#include "host_sim/summary.hpp"
+
+namespace {
+
+constexpr const char* kAbout =
+    "Runs the radar firmware against synthetic or recorded beat signals, shows its tracks, and compares them "
+    "with the "
+    "truth.\n";
+
+constexpr const char* kFooter = R"(
+Examples:
+  radar_sim --scenario four-targets --plot out --log out/can.log
+  radar_sim --scenario highway --tracker jpda --seed 7 --json result.json
+  radar_sim --scenario approach --can vcan0 --realtime        (candump vcan0, or radar_monitor vcan0, in another terminal)
+  radar_sim --replay frames.bin --waveform waveform.json
+  radar_sim --traffic traffic.csv --ego ego.csv --plot out
+
+Files:
+  scenario  JSON; the shipped ones are listed by --list-scenarios and lie in
+            )";
+
+constexpr const char* kFormats = R"(
+  frames    .bin, little-endian int16 [frame][chirp 0..63][sample 0..63], 8192 bytes a frame
+  waveform  JSON object with any of carrier_hz, bandwidth_hz, sample_rate_hz, chirp_interval_ns, range_offset_um, period_ms
+  traffic   CSV with columns time_s, track_id, range_m, range_rate_mps
+  ego       CSV with columns time_s, speed_mps
+  detections  CSV with columns frame, range_m, range_rate_mps, snr_db
+
+Exit status: 0 the run went to its end; 1 wrong usage, bad input or a file that cannot be read or written.)";
+
+void list_scenarios() {
+    for (const auto& name : sim::shipped_scenarios())
+        std::printf("%-14s %s\n", name.c_str(), sim::load_scenario(name).description.c_str());
+}
+
+std::string tracker_names() {
+    std::string names;
+    for (const auto name : tracking::kAssociatorNames)
+        names += (names.empty() ? "" : ", ") + std::string(name);
+    return names;
+}
+
+struct Arguments {
+    sim::SimulationOptions options;
+    std::string scenario;
+    std::string waveform;
+    std::string tracker = "ospda";
+    std::int64_t frames = 0;
+    std::string json;
+    std::string plot;
+    bool realtime = false;
+    bool list = false;
+};
+
+void resolve(Arguments& a, bool frames_given) {
+    sim::SimulationOptions& o = a.options;
+    if (const auto tracker = tracking::associator_named(a.tracker)) {
+        o.tracker = *tracker;
+    } else {
+        throw sim::InputError("--tracker: no tracker named \"" + a.tracker + "\"; known: " + tracker_names());
+    }
+    if (frames_given) {
+        if (a.frames < 1)
+            throw sim::InputError("--frames: must be at least 1, is " + std::to_string(a.frames));
+        o.frames = static_cast<std::uint64_t>(a.frames);
+    }
+    if (a.realtime) o.speed = 1;
+    if (!a.scenario.empty()) o.scenario = sim::load_scenario(a.scenario);
+    if (!a.waveform.empty()) o.waveform = sim::read_waveform(a.waveform);
+}
+
+int run(const Arguments& a) {
+    sim::Simulation simulation(a.options);
+    std::optional<sim::Plots> plots;
+    if (!a.plot.empty()) {
+        const std::string title = simulation.result().scenario + ", " + a.tracker;
+        plots.emplace(a.plot, title, simulation.waveform(), simulation.frames());
+    }
+    std::ofstream json;
+    if (!a.json.empty()) {
+        json.open(a.json);
+        if (!json) throw sim::InputError(a.json + ": cannot be created");
+    }
+    std::optional<sim::LiveView> live;
+    if (!a.options.quiet) live.emplace(stdout, simulation.frames());
+
+    const auto start = std::chrono::steady_clock::now();
+    while (simulation.step()) {
+        if (live) live->show(simulation.view());
+        if (plots) plots->add(simulation.view());
+    }
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    const sim::SimulationResult result = simulation.result();
+    if (live && result.frames > 0) live->finish(simulation.view());
+    if (!a.options.quiet) {
+        const double simulated_s =
+            static_cast<double>(result.frames) * simulation.waveform().period_ms / 1000;
+        std::fputs(sim::to_text(result, simulated_s, took.count()).c_str(), stdout);
+        for (const auto* file : {&a.options.log, &a.options.record})
+            if (!file->empty()) std::printf("wrote %s\n", file->c_str());
+    }
+    if (plots) {
+        for (const auto& picture : plots->draw())
+            if (!a.options.quiet) std::printf("wrote %s\n", picture.c_str());
+    }
+    if (!a.json.empty()) {
+        json << sim::to_json(result).dump(2) << '\n';
+        if (!json.flush()) throw sim::InputError(a.json + ": cannot be written, is the disk full?");
+        if (!a.options.quiet) std::printf("wrote %s\n", a.json.c_str());
+    }
+    return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Arguments a;
+    sim::SimulationOptions& o = a.options;
+    CLI::App app(kAbout);
+    app.footer(kFooter + sim::scenario_directory().string() + kFormats);
+    app.get_formatter()->column_width(26);
+
+    auto* scenario =
+        app.add_option("--scenario", a.scenario, "name of a shipped scenario, or a file that ends in .json");
+    auto* replay = app.add_option("--replay", o.replay, "recorded beat frames in place of a scenario");
+    auto* traffic = app.add_option("--traffic", o.traffic,
+                                   "recorded motion to synthesise beat signals from, RCS 10 dBsm each");
+    auto* detections =
+        app.add_option("--detections", o.detections, "detections that bypass the signal processing");
+    auto* list = app.add_flag("--list-scenarios", a.list, "list the shipped scenarios and end");
+    auto* waveform =
+        app.add_option("--waveform", a.waveform, "of the recording; the standard one if not given");
+    app.add_option("--ego", o.ego, "own speed for a recording; not given, the radar is told none");
+    auto* frames = app.add_option("--frames", a.frames, "stop after so many frames of 0.1 s");
+    app.add_option("--seed", o.seed, "of noise, fluctuation and clutter")->capture_default_str();
+    app.add_option("--tracker", a.tracker, "data association: " + tracker_names())->capture_default_str();
+    app.add_option("--can", o.bus, "CAN interface, or loopback: a bus inside this program")
+        ->capture_default_str();
+    app.add_option("--log", o.log, "write all CAN traffic, in the format of candump -L");
+    app.add_option("--record", o.record, "write the beat frames");
+    app.add_option("--json", a.json, "write the summary");
+    app.add_option("--plot", a.plot, "directory for pictures of the run (needs gnuplot)");
+    auto* realtime = app.add_flag("--realtime", a.realtime, "one second a second; else as fast as possible");
+    app.add_option("--speed", o.speed, "so many seconds in one second")
+        ->check(CLI::PositiveNumber)
+        ->excludes(realtime);
+    app.add_flag("--quiet", o.quiet, "no output but errors");
+    for (auto* input : {scenario, replay, traffic, detections}) {
+        for (auto* other : {scenario, replay, traffic, detections, list})
+            if (input != other) input->excludes(other);
+    }
+    waveform->excludes(scenario);
+
+    try {
+        app.parse(argc, argv);
+        if (a.list) {
+            list_scenarios();
+            return 0;
+        }
+        if (a.scenario.empty() && o.replay.empty() && o.traffic.empty() && o.detections.empty())
+            throw sim::InputError(
+                "nothing to do: give --scenario, --replay, --traffic or --detections, or see --help");
+        resolve(a, !frames->empty());
+        return run(a);
+    } catch (const CLI::ParseError& e) {
+        return app.exit(e) == 0 ? 0 : 1;
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "radar_sim: %s\n", e.what());
+        return 1;
+    }
+}

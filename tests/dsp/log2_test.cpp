@@ -1,0 +1,46 @@
+// Expected values: the C library's logarithms.
+#include <cmath>
+
+#include "dsp/log2.hpp"
+
+#include <CppUTest/TestHarness.h>
+
+TEST_GROUP(Log2){};
+
+TEST(Log2, LogarithmIsWithinItsStatedError) {
+    double worst = 0;
+    for (std::uint32_t v = 1; v < 1U << 20; ++v) {
+        worst = std::max(worst, std::abs(dsp::log2_q10(v) - 1024 * std::log2(static_cast<double>(v))));
+    }
+    for (std::uint64_t v = 1U << 20; v < 1ULL << 32; v += 40'009) {
+        const auto x = static_cast<std::uint32_t>(v);
+        worst = std::max(worst, std::abs(dsp::log2_q10(x) - 1024 * std::log2(static_cast<double>(x))));
+    }
+    CHECK(worst <= 0.7);
+    LONGS_EQUAL(0, dsp::log2_q10(0));
+    LONGS_EQUAL(31 * 1024, dsp::log2_q10(1U << 31));
+    LONGS_EQUAL(32 * 1024, dsp::log2_q10(0xFFFFFFFFU));
+}
+
+TEST(Log2, LogarithmNeverFalls) {
+    std::int32_t last = 0;
+    for (std::uint32_t v = 1; v < 1U << 18; ++v) {
+        const std::int32_t now = dsp::log2_q10(v);
+        CHECK(now >= last);
+        last = now;
+    }
+}
+
+TEST(Log2, PowerIsWithinItsStatedError) {
+    for (std::int32_t x = -33 * 1024; x <= 0; ++x) {
+        const double exact = std::exp2(30 + x / 1024.0);
+        const double got = dsp::exp2_q30(x);
+        CHECK(std::abs(got - exact) <= std::max(1.0, 1e-4 * exact));
+    }
+}
+
+TEST(Log2, DecibelsConvert) {
+    for (int cdb = -2000; cdb <= 9000; cdb += 7) {
+        DOUBLES_EQUAL(1024 * cdb / 1000.0 * std::log2(10.0), dsp::log2_from_cdb(cdb), 0.6);
+    }
+}

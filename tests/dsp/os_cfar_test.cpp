@@ -1,0 +1,177 @@
+// Expected values: thresholds from Rohling's product formula solved elsewhere in double precision; decisions
+// by sorting; maxima by comparing all neighbours.
+#include <cmath>
+#include <memory>
+
+#include "dsp/os_cfar.hpp"
+#include "tests/bench/accuracy_dsp.hpp"
+
+#include <CppUTest/TestHarness.h>
+
+TEST_GROUP(OsCfar) {
+    std::unique_ptr<dsp::PowerMap> map = std::make_unique<dsp::PowerMap>();
+    dsp::CellMask all;
+    dsp::CellMask hits;
+
+    void setup() override {
+        all.row.fill(~std::uint64_t{0});
+        fill(9000);
+    }
+    void fill(std::uint16_t level) {
+        for (auto& row : map->cell) row.fill(level);
+    }
+    int count_hits(const dsp::CfarConfig& config = {}) {
+        dsp::os_cfar(*map, dsp::OsCfar(config), all, hits);
+        int count = 0;
+        for (const auto row : hits.row) count += std::popcount(row);
+        return count;
+    }
+};
+
+TEST(OsCfar, ThresholdFactors) {
+    struct {
+        int cells, rank, ppb;
+        double alpha;
+    } const table[] = {
+        {16, 12, 10'000'000, 4.425}, {16, 12, 1'000'000, 7.421}, {16, 12, 100'000, 11.080},
+        {24, 18, 10'000'000, 4.025}, {24, 18, 1'000'000, 6.502}, {24, 18, 100'000, 9.341},
+        {32, 24, 10'000'000, 3.838}, {32, 24, 1'000'000, 6.086}, {32, 24, 100'000, 8.580},
+    };
+    for (const auto& t : table) {
+        DOUBLES_EQUAL(1024 * std::log2(t.alpha), dsp::os_cfar_alpha(t.cells, t.rank, t.ppb), 1);
+    }
+    // One reference cell: Pfa = 1/(1+alpha), in closed form.
+    DOUBLES_EQUAL(1024 * std::log2(999.0), dsp::os_cfar_alpha(1, 1, 1'000'000), 1);
+    DOUBLES_EQUAL(1024 * std::log2(999'999.0), dsp::os_cfar_alpha(1, 1, 1'000), 1);
+}
+
+TEST(OsCfar, ThresholdSolvesTheFormulaForEveryShape) {
+    for (int cells = 1; cells <= dsp::kMaxReferenceCells; cells += cells < 8 ? 1 : 8) {
+        for (int rank = 1; rank <= cells; rank += cells < 8 ? 1 : 3) {
+            for (const int ppb : {1'000, 100'000, 100'000'000}) {
+                const auto pfa = [&](double log2_alpha) {
+                    double product = 1;
+                    for (int i = 0; i < rank; ++i)
+                        product *= (cells - i) / (cells - i + std::exp2(log2_alpha / 1024));
+                    return product * 1e9;
+                };
+                const int alpha = dsp::os_cfar_alpha(cells, rank, ppb);
+                CHECK(pfa(alpha - 1) >= ppb && pfa(alpha + 1) <= ppb);
+            }
+        }
+    }
+}
+
+TEST(OsCfar, NoiseOffsetIsTheMeanOfTheOrderStatistic) {
+    DOUBLES_EQUAL(0, dsp::os_cfar_noise_offset(1, 1), 0.6);
+    double mean = 0;
+    for (int i = 0; i < 12; ++i) mean += 1.0 / (20 - i);
+    DOUBLES_EQUAL(-1024 * std::log2(mean), dsp::os_cfar_noise_offset(20, 12), 0.6);
+}
+
+TEST(OsCfar, TheSameDecisionsAsSorting) {
+    for (const auto& row : bench::os_cfar_exactness(5)) CHECK_TEXT(row.met(), row.what.c_str());
+}
+
+TEST(OsCfar, ConstantAndEmptyMapsGiveNothing) {
+    for (const int level : {0, 1, 9000, 65535}) {
+        fill(static_cast<std::uint16_t>(level));
+        LONGS_EQUAL(0, count_hits());
+    }
+    // Even where a lax design puts the threshold below the reference cells, nothing is not a target.
+    fill(0);
+    dsp::CfarConfig lax;
+    lax.rank = static_cast<std::int16_t>(lax.reference_cells());
+    lax.false_alarm_ppb = 100'000'000;
+    lax.offset_cdb = -300;
+    LONGS_EQUAL(0, count_hits(lax));
+}
+
+TEST(OsCfar, OneCellOverThresholdAnywhereIsFoundAndAloneAt) {
+    const int threshold = dsp::OsCfar(dsp::CfarConfig{}).threshold();
+    for (std::size_t r = 0; r < 32; ++r) {
+        for (std::size_t d = 0; d < 64; d += 7) {
+            fill(9000);
+            map->cell[r][d] = static_cast<std::uint16_t>(9000 + threshold);
+            LONGS_EQUAL(0, count_hits());
+            ++map->cell[r][d];
+            LONGS_EQUAL(r >= 2 ? 1 : 0, count_hits());
+            LONGS_EQUAL(r >= 2, hits.test(static_cast<int>(r), static_cast<int>(d)));
+        }
+    }
+}
+
+TEST(OsCfar, OnlyCandidatesAreTested) {
+    map->cell[10][10] = map->cell[20][20] = 40000;
+    dsp::CellMask one;
+    one.set(20, 20);
+    dsp::os_cfar(*map, dsp::OsCfar(dsp::CfarConfig{}), one, hits);
+    CHECK(hits.test(20, 20));
+    CHECK_FALSE(hits.test(10, 10));
+}
+
+TEST(OsCfar, TheOffsetMovesTheThreshold) {
+    dsp::CfarConfig config;
+    const int before = dsp::OsCfar(config).threshold();
+    config.offset_cdb = 600;
+    DOUBLES_EQUAL(before + 1024 * 0.6 * std::log2(10.0), dsp::OsCfar(config).threshold(), 1);
+}
+
+TEST(OsCfar, InvalidConfigurationsAreRecognised) {
+    dsp::CfarConfig config;
+    config.rank = 0;
+    CHECK_FALSE(config.valid());
+    config = {};
+    config.rank = static_cast<std::int16_t>(config.reference_cells() + 1);
+    CHECK_FALSE(config.valid());
+    config = {};
+    config.doppler_reference = 16;
+    config.doppler_guard = 8;  // the two arms would meet behind the cell
+    config.rank = 1;
+    CHECK_FALSE(config.valid());
+    config = {};
+    config.false_alarm_ppb = 0;
+    CHECK_FALSE(config.valid());
+    config = {};
+    config.offset_cdb = 2001;
+    CHECK_FALSE(config.valid());
+}
+
+TEST(OsCfar, LocalMaximaAgainstAllNeighbours) {
+    std::uint32_t state = 99;
+    for (const unsigned levels : {2U, 5U, 60000U}) {
+        for (const int first : {0, 2, 5}) {
+            for (auto& row : map->cell) {
+                for (auto& cell : row) {
+                    state = state * 1664525U + 1013904223U;
+                    cell = static_cast<std::uint16_t>((state >> 8) % levels);
+                }
+            }
+            dsp::CellMask maxima;
+            dsp::local_maxima(*map, first, maxima);
+            for (int r = 0; r < 32; ++r) {
+                for (int d = 0; d < 64; ++d) {
+                    bool expected = r >= first;
+                    for (int i = -1; i <= 1; ++i) {
+                        for (int j = -1; j <= 1; ++j) {
+                            const int rr = r + i;
+                            const int dd = (d + j + 64) % 64;
+                            if ((i == 0 && j == 0) || rr < 0 || rr > 31) continue;
+                            const int x = map->cell[static_cast<std::size_t>(r)][static_cast<std::size_t>(d)];
+                            const int y =
+                                map->cell[static_cast<std::size_t>(rr)][static_cast<std::size_t>(dd)];
+                            if (y > x || (y == x && 64 * rr + dd > 64 * r + d)) expected = false;
+                        }
+                    }
+                    LONGS_EQUAL(expected, maxima.test(r, d));
+                }
+            }
+        }
+    }
+    fill(5);
+    dsp::CellMask maxima;
+    dsp::local_maxima(*map, 2, maxima);
+    int count = 0;
+    for (const auto row : maxima.row) count += std::popcount(row);
+    LONGS_EQUAL(1, count);
+}

@@ -1,0 +1,107 @@
+// Expected values: the same chain in double precision.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "dsp/range_doppler.hpp"
+#include "tests/bench/accuracy_dsp.hpp"
+#include "tests/bench/dsp_reference.hpp"
+
+#include <CppUTest/TestHarness.h>
+
+using dsp::WindowKind;
+
+TEST_GROUP(RangeDoppler) {
+    std::unique_ptr<dsp::Spectrum> spectrum = std::make_unique<dsp::Spectrum>();
+    std::unique_ptr<dsp::PowerMap> map = std::make_unique<dsp::PowerMap>();
+    bench::Random random{21};
+
+    double cell(std::size_t r, std::size_t d) const {
+        return map->cell[r][d] / 1024.0;
+    }
+
+    /// Every cell's amplitude within 1 % (the logarithm's step and the windows' last place) and `rounding` of
+    /// the map's largest amplitude: 16 bits at each of the two transforms.
+    void compare(const dsp::BeatFrame& frame, WindowKind range, WindowKind doppler, double rounding = 2e-5) {
+        dsp::range_doppler(frame, range, doppler, *spectrum, *map);
+        const auto exact = bench::power_map(frame, range, doppler);
+        const double peak = std::sqrt(*std::ranges::max_element(exact));
+        for (std::size_t i = 0; i < 2048; ++i) {
+            const double amplitude = std::sqrt(exact[i]);
+            DOUBLES_EQUAL(amplitude, std::exp2(cell(i / 64, i % 64) / 2),
+                          1 + 0.01 * amplitude + rounding * peak);
+        }
+    }
+};
+
+TEST(RangeDoppler, NoiseMapAgreesWithDouble) {
+    for (const auto range :
+         {WindowKind::rectangular, WindowKind::hann, WindowKind::hamming, WindowKind::blackman}) {
+        for (const double sigma : {3.0, 200.0, 7000.0}) {
+            bench::Samples samples(4096, 100.0);
+            bench::add_noise(samples, sigma, random);
+            compare(bench::convert(samples), range, WindowKind::hann, 1e-3);
+        }
+    }
+}
+
+TEST(RangeDoppler, ATargetPeaksInItsCell) {
+    // Doppler cell 61 is 3 cells closing; range 10 cells plus the coupling of that speed.
+    const double rate = -3 * 0.950539;
+    bench::Samples samples(4096, 0.0);
+    bench::add_tone(samples, {10 * 4.996541 - 0.082133 * rate, rate, 100, 1});
+    dsp::range_doppler(bench::convert(samples), WindowKind::hann, WindowKind::hann, *spectrum, *map);
+    std::size_t best = 0;
+    for (std::size_t i = 0; i < 2048; ++i) {
+        if (map->cell[i / 64][i % 64] > map->cell[best / 64][best % 64]) best = i;
+    }
+    LONGS_EQUAL(10, best / 64);
+    LONGS_EQUAL(61, best % 64);
+    // |A/2 * 32 * 32|^2 for a Hann window in both directions.
+    DOUBLES_EQUAL(2 * std::log2(100.0 / 2 * 32 * 32), cell(10, 61), 0.01);
+}
+
+TEST(RangeDoppler, AWeakTargetBesideAStrongOneKeepsItsPower) {
+    bench::Samples samples(4096, 0.0);
+    bench::add_tone(samples, {10 * 4.996541, 0, 2000, 0.3});
+    bench::add_tone(samples, {24 * 4.996541, 0, 1, 0.9});  // 66 dB below, another row
+    bench::add_noise(samples, 0.5, random);
+    compare(bench::convert(samples, 2047), WindowKind::hann, WindowKind::hann);
+    DOUBLES_EQUAL(2 * std::log2(1.0 / 2 * 32 * 32), cell(24, 0), 0.3);
+}
+
+TEST(RangeDoppler, ABurstInTwoChirpsLeavesTheOthersTheirPrecision) {
+    bench::Samples samples(4096, 0.0);
+    bench::add_noise(samples, 2, random);
+    for (std::size_t n = 0; n < 64; ++n) samples[64 * 20 + n] += n % 2 ? 30000 : -30000;
+    const dsp::BeatFrame frame = bench::convert(samples);
+    // A burst is no tone: its rounding has no gain from the sum over the chirps.
+    compare(frame, WindowKind::hann, WindowKind::hann, 1e-4);
+}
+
+TEST(RangeDoppler, FullScaleSquareWavesDoNotOverflow) {
+    dsp::BeatFrame frame;
+    for (std::size_t k = 0; k < 64; ++k) {
+        for (std::size_t n = 0; n < 64; ++n) {
+            frame.chirp[k][n] = static_cast<std::int16_t>((n / 4 + k / 8) % 2 ? 32767 : -32768);
+        }
+    }
+    dsp::range_doppler(frame, WindowKind::rectangular, WindowKind::rectangular, *spectrum, *map);
+    const auto exact = bench::power_map(frame, WindowKind::rectangular, WindowKind::rectangular);
+    for (std::size_t i = 0; i < 2048; ++i) {
+        if (exact[i] > 1e9) DOUBLES_EQUAL(std::log2(exact[i]), cell(i / 64, i % 64), 0.01);
+    }
+}
+
+TEST(RangeDoppler, AFrameWithoutSignalIsAllZero) {
+    dsp::BeatFrame frame;
+    for (auto& chirp : frame.chirp) chirp.fill(77);
+    dsp::range_doppler(frame, WindowKind::hann, WindowKind::hann, *spectrum, *map);
+    for (const auto& row : map->cell) {
+        for (const auto x : row) LONGS_EQUAL(0, x);
+    }
+}
+
+TEST(RangeDoppler, AccuracyTable) {
+    for (const auto& row : bench::noise_floor()) CHECK_TEXT(row.met(), row.what.c_str());
+}

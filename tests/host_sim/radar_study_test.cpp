@@ -1,0 +1,84 @@
+// The program as a user runs it: the same tables with one thread, with two, interrupted, and under mpirun.
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <CppUTest/TestHarness.h>
+
+namespace {
+
+const std::filesystem::path kRoot = std::filesystem::temp_directory_path() / "radar_study_test";
+
+int shell(const std::string& command) {
+    return std::system((command + " >/dev/null 2>&1").c_str());
+}
+
+std::string study(const char* out, const std::string& options) {
+    return std::string(RADAR_STUDY) + " lee2000 --no-pictures --scenarios " + kRoot.string() + " --out " +
+           (kRoot / out).string() + " " + options;
+}
+
+std::string contents(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void check_same(const char* out) {
+    for (const char* file : {"lee2000.txt", "lee2000.csv", "lee2000.json"}) {
+        const std::string expected = contents(kRoot / "one" / file);
+        CHECK(!expected.empty());
+        CHECK_TEXT(expected == contents(kRoot / out / file), file);
+    }
+}
+
+/// Three conditions instead of twenty-five, and the results of a first run in "one".
+void prepare() {
+    std::filesystem::remove_all(kRoot);
+    std::filesystem::create_directories(kRoot);
+    std::ofstream(kRoot / "lee2000.json") << R"({ "geometries": ["lee2000-short"], "clutter_density": [0.02],
+        "sweeps": { "gate": [9.21] },
+        "unresolved": { "geometry": "lee2000-short", "clutter_density": [0.005] } })";
+    std::ofstream(kRoot / "lee2000-short.json")
+        << R"({ "description": "short", "duration_s": 4, "pairs": [[1, 2]],
+        "targets": [ { "range_m": 50, "range_rate_mps": -1 }, { "range_m": 48, "range_rate_mps": 0 } ] })";
+    LONGS_EQUAL(0, shell(study("one", "--runs 4 --threads 1")));
+}
+
+}  // namespace
+
+TEST_GROUP(RadarStudy){};
+
+TEST(RadarStudy, SameTablesHoweverItIsRun) {
+    prepare();
+    LONGS_EQUAL(0, shell(study("two", "--runs 4 --threads 2")));
+    check_same("two");
+
+    // Killed at some moment, then started again.
+    shell("timeout -s KILL 0.05 " + study("killed", "--runs 4"));
+    LONGS_EQUAL(0, shell(study("killed", "--runs 4")));
+    check_same("killed");
+
+    if (shell("command -v mpirun") != 0) {
+        std::printf("mpirun is not installed: not compared\n");
+        return;
+    }
+    LONGS_EQUAL(
+        0,
+        shell("env OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n 2 " +
+              study("mpi", "--runs 4")));
+    CHECK(std::filesystem::exists(kRoot / "mpi" / "lee2000.1.runs") || !RADAR_WITH_MPI);
+    check_same("mpi");
+}
+
+TEST(RadarStudy, ErrorsAreToldAndLoseNothing) {
+    prepare();
+    CHECK(shell(study("one", "--runs 4 --seed 9")) != 0);
+    CHECK(shell(study("one", "--runs 1")) != 0);
+    CHECK(shell(study("/proc/none", "--runs 4")) != 0);
+    CHECK(shell(std::string(RADAR_STUDY) + " lee1999 --out x") != 0);
+    CHECK(shell(std::string(RADAR_STUDY)) != 0);
+    LONGS_EQUAL(0, shell(study("one", "--runs 4")));
+}
