@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <utility>
 
 #include "can/codec.hpp"
@@ -62,27 +63,41 @@ std::vector<can::Frame> FirmwareReplica::run(const CycleInputs& inputs) {
     return std::move(world_->sent);
 }
 
+bool FirmwareReplica::same_state(const FirmwareReplica& other) const {
+    return std::memcmp(&radar_, &other.radar_, sizeof radar_) == 0;
+}
+
 BoardTwin::BoardTwin(const firmware::RadarConfig& config)
-    : replica_(std::make_unique<FirmwareReplica>(config)) {}
+    : histories_{{.replica = std::make_shared<FirmwareReplica>(config), .beats = {}, .bus = {}}} {}
 
 void BoardTwin::beat_sent(std::uint32_t sequence, const dsp::BeatFrame& frame) {
     candidates_.clear();
-    beats_.push_back({sequence, frame});
-    if (beats_.size() > kMaxBeats) {
-        beats_.pop_front();
-        ++counters_.passed_over;
+    const auto sent = std::make_shared<const SentBeat>(SentBeat{sequence, frame});
+    for (History& h : histories_) {
+        h.beats.push_back(sent);
+        if (h.beats.size() > kMaxBeats) h.beats.pop_front();
     }
 }
 
 void BoardTwin::bus_sent(const can::Frame& frame) {
     candidates_.clear();
-    bus_.push_back(frame);
-    if (bus_.size() > kMaxBus) bus_.pop_front();
+    for (History& h : histories_) {
+        h.bus.push_back(frame);
+        if (h.bus.size() > kMaxBus) h.bus.pop_front();
+    }
+}
+
+BoardTwinCounters BoardTwin::counters() const {
+    BoardTwinCounters c = histories_.front().counters;
+    c.lists = lists_;
+    c.different = different_;
+    c.can_frames = can_frames_;
+    return c;
 }
 
 std::optional<ListVerdict> BoardTwin::receive(const can::Frame& frame) {
     if (frame.id < can::status::kMessage.id || frame.id >= can::ego::kMessage.id) return std::nullopt;
-    ++counters_.can_frames;
+    ++can_frames_;
     if (can::status::kMessage.has(frame.id)) {
         const std::optional<ListVerdict> last = give_up_list();
         list_.assign(1, frame);
@@ -94,7 +109,7 @@ std::optional<ListVerdict> BoardTwin::receive(const can::Frame& frame) {
     if (settled_) {
         if (list_.empty() || pass_over_rest_) return std::nullopt;  // empty: in the middle of a list at start
         pass_over_rest_ = true;
-        ++counters_.different;
+        ++different_;
         return ListVerdict{.difference = "after the end of the list came " + to_text(frame)};
     }
     list_.push_back(frame);
@@ -113,84 +128,114 @@ bool BoardTwin::header_and_objects_there() const {
     return list_.size() >= kHeaderAt + 1 + 2 * std::size_t{header.count};
 }
 
-std::vector<BoardTwin::Candidate> BoardTwin::possible_inputs() const {
-    can::Status status;
-    const bool late = can::decode(list_.front(), status) && status.overruns != overruns_before_;
-    std::vector<Candidate> all;
-    for (const bool overrun : {late, !late}) {
-        for (std::size_t unread = 0; unread <= bus_.size(); ++unread) {
-            const std::size_t bus_count = bus_.size() - unread;
-            for (std::size_t i = 0; i < beats_.size(); ++i)
-                all.push_back({hal::BeatResult::ok, i, overrun, bus_count, nullptr, {}});
-            all.push_back({hal::BeatResult::missing, 0, overrun, bus_count, nullptr, {}});
-            all.push_back({hal::BeatResult::invalid, 0, overrun, bus_count, nullptr, {}});
-        }
+void BoardTwin::add_candidate(const History& before, hal::BeatResult beat, std::size_t beat_index,
+                              bool overrun, std::size_t bus_count) {
+    const auto bus_end = before.bus.begin() + static_cast<std::ptrdiff_t>(bus_count);
+    const std::vector<can::Frame> bus(before.bus.begin(), bus_end);
+    CycleInputs inputs{.beat = beat, .overrun = overrun, .bus = bus};
+    Candidate c{.after = before, .list = {}, .beat = beat, .sequence = 0};
+    c.after.bus.erase(c.after.bus.begin(), c.after.bus.begin() + static_cast<std::ptrdiff_t>(bus_count));
+    BoardTwinCounters& counters = c.after.counters;
+    if (overrun) ++counters.overruns;
+    switch (beat) {
+        case hal::BeatResult::ok:
+            inputs.frame = &before.beats[beat_index]->frame;
+            inputs.sequence = c.sequence = before.beats[beat_index]->sequence;
+            c.after.beats.erase(c.after.beats.begin(),
+                                c.after.beats.begin() + static_cast<std::ptrdiff_t>(beat_index) + 1);
+            ++counters.processed;
+            break;
+        case hal::BeatResult::invalid:
+            ++counters.invalid;
+            break;
+        default:
+            ++counters.missing;
     }
-    return all;
+    const auto replica = std::make_shared<FirmwareReplica>(*before.replica);
+    c.list = replica->run(inputs);
+    c.after.replica = replica;
+    candidates_.push_back(std::move(c));
 }
 
-void BoardTwin::evaluate(Candidate& candidate) const {
-    if (candidate.after) return;
-    const std::vector<can::Frame> bus(bus_.begin(),
-                                      bus_.begin() + static_cast<std::ptrdiff_t>(candidate.bus_count));
-    CycleInputs inputs{.beat = candidate.beat, .overrun = candidate.overrun, .bus = bus};
-    if (candidate.beat == hal::BeatResult::ok) {
-        inputs.frame = &beats_[candidate.beat_index].frame;
-        inputs.sequence = beats_[candidate.beat_index].sequence;
+/// Everything that can have led to the list whose status is known, the most likely first. `beats`: so many of
+/// the beat frames not taken yet are tried.
+void BoardTwin::find_candidates(std::size_t beats) {
+    candidates_.clear();
+    can::Status status;
+    const bool readable = can::decode(list_.front(), status);
+    for (const History& h : histories_) {
+        // The status counts late cycles, but a restart sets the count to 0.
+        const bool restart = std::any_of(
+            h.bus.begin(), h.bus.end(), [](const can::Frame& f) { return can::command::kMessage.has(f.id); });
+        const bool late = readable && status.overruns != overruns_before_;
+        for (std::size_t unread = 0; unread <= h.bus.size(); ++unread) {
+            for (const bool overrun : {late, !late}) {
+                if (overrun != late && !restart) continue;
+                const std::size_t bus_count = h.bus.size() - unread;
+                for (std::size_t i = 0; i < std::min(beats, h.beats.size()); ++i)
+                    add_candidate(h, hal::BeatResult::ok, i, overrun, bus_count);
+                if (readable && status.detections != 0) continue;  // there was a frame to detect them in
+                add_candidate(h, hal::BeatResult::missing, 0, overrun, bus_count);
+                add_candidate(h, hal::BeatResult::invalid, 0, overrun, bus_count);
+            }
+        }
     }
-    candidate.after = std::make_unique<FirmwareReplica>(*replica_);
-    candidate.list = candidate.after->run(inputs);
+    // Nothing fits a status like this; what the PC would have said without a frame is compared with it.
+    if (candidates_.empty()) add_candidate(histories_.front(), hal::BeatResult::missing, 0, false, 0);
 }
 
 /// `whole`: nothing more will come of the list.
 std::optional<ListVerdict> BoardTwin::judge(bool whole) {
-    if (candidates_.empty()) candidates_ = possible_inputs();
-    Candidate* nearest = nullptr;
-    std::size_t nearest_equal = 0;
-    for (Candidate& c : candidates_) {
-        evaluate(c);
-        const auto equal = static_cast<std::size_t>(
-            std::mismatch(list_.begin(), list_.end(), c.list.begin(), c.list.end()).first - list_.begin());
-        if (equal == list_.size() && equal == c.list.size()) return settle(c, "");
-        if (equal == list_.size() && equal < c.list.size() && !whole) return std::nullopt;
-        if (nearest == nullptr || equal > nearest_equal) {
-            nearest = &c;
-            nearest_equal = equal;
+    const auto begins_so = [this](const Candidate& c) {
+        return c.list.size() >= list_.size() && std::equal(list_.begin(), list_.end(), c.list.begin());
+    };
+    if (candidates_.empty()) find_candidates(kLikelyBeats);
+    if (std::none_of(candidates_.begin(), candidates_.end(), begins_so)) find_candidates(kMaxBeats);
+
+    std::vector<const Candidate*> equal;
+    for (const Candidate& c : candidates_) {
+        if (!begins_so(c)) continue;
+        if (c.list.size() == list_.size()) {
+            equal.push_back(&c);
+        } else if (!whole) {
+            return std::nullopt;  // it may go on
         }
     }
-    const std::string expected =
-        nearest_equal < nearest->list.size() ? to_text(nearest->list[nearest_equal]) : "the end of the list";
-    const std::string got = nearest_equal < list_.size() ? to_text(list_[nearest_equal]) : "nothing more";
-    return settle(*nearest, "frame " + std::to_string(nearest_equal + 1) + " of the list: board " + got +
-                                ", PC " + expected);
+    if (!equal.empty()) return settle(equal, "");
+
+    const auto equal_frames = [this](const Candidate& c) {
+        return static_cast<std::size_t>(
+            std::mismatch(list_.begin(), list_.end(), c.list.begin(), c.list.end()).first - list_.begin());
+    };
+    const Candidate& nearest = *std::max_element(
+        candidates_.begin(), candidates_.end(),
+        [&](const Candidate& a, const Candidate& b) { return equal_frames(a) < equal_frames(b); });
+    const std::size_t at = equal_frames(nearest);
+    const std::string expected = at < nearest.list.size() ? to_text(nearest.list[at]) : "the end of the list";
+    const std::string got = at < list_.size() ? to_text(list_[at]) : "nothing more";
+    return settle({&nearest}, "frame " + std::to_string(at + 1) + ": board " + got + ", PC " + expected);
 }
 
-ListVerdict BoardTwin::settle(Candidate& chosen, std::string difference) {
+ListVerdict BoardTwin::settle(const std::vector<const Candidate*>& chosen, std::string difference) {
     ListVerdict verdict{.identical = difference.empty(),
-                        .beat = chosen.beat,
-                        .overrun = chosen.overrun,
+                        .beat = chosen.front()->beat,
+                        .sequence = chosen.front()->sequence,
                         .difference = std::move(difference)};
-    ++counters_.lists;
-    if (!verdict.identical) ++counters_.different;
+    ++lists_;
+    if (!verdict.identical) ++different_;
     pass_over_rest_ = !verdict.identical;
-    if (chosen.overrun) ++counters_.overruns;
-    switch (chosen.beat) {
-        case hal::BeatResult::ok:
-            verdict.sequence = beats_[chosen.beat_index].sequence;
-            ++counters_.processed;
-            counters_.passed_over += chosen.beat_index;
-            beats_.erase(beats_.begin(), beats_.begin() + static_cast<std::ptrdiff_t>(chosen.beat_index) + 1);
-            break;
-        case hal::BeatResult::invalid:
-            ++counters_.invalid;
-            break;
-        default:
-            ++counters_.missing;
-    }
-    bus_.erase(bus_.begin(), bus_.begin() + static_cast<std::ptrdiff_t>(chosen.bus_count));
     can::Status status;
     if (can::decode(list_.front(), status)) overruns_before_ = status.overruns;
-    replica_ = std::move(chosen.after);
+
+    std::vector<History> next;
+    for (const Candidate* c : chosen) {
+        const History& h = c->after;
+        const bool known = std::any_of(next.begin(), next.end(), [&](const History& other) {
+            return other.beats == h.beats && other.bus == h.bus && other.replica->same_state(*h.replica);
+        });
+        if (!known && next.size() < kMaxHistories) next.push_back(h);
+    }
+    histories_ = std::move(next);
     candidates_.clear();
     settled_ = true;
     return verdict;

@@ -35,6 +35,10 @@ class FirmwareReplica {
     /// What the radar sends in this cycle, in order.
     std::vector<can::Frame> run(const CycleInputs& inputs);
 
+    /// True only if both will answer the same inputs with the same frames for ever. (False may be wrong:
+    /// bytes that no longer matter are compared too.)
+    [[nodiscard]] bool same_state(const FirmwareReplica& other) const;
+
   private:
     struct World;
 
@@ -48,31 +52,29 @@ struct ListVerdict {
     bool identical = false;
     hal::BeatResult beat = hal::BeatResult::missing;  ///< what the board must have had for it
     std::uint32_t sequence = 0;                       ///< for BeatResult::ok
-    bool overrun = false;
     /// Of a list that is not identical: the first frame that differs, as it came and as it should have been.
-    std::string difference;
+    std::string difference = {};
 };
 
 struct BoardTwinCounters {
     std::uint64_t lists = 0;
     std::uint64_t different = 0;
     std::uint64_t can_frames = 0;
-    std::uint64_t processed = 0;    ///< beat frames that a list shows to have been processed
-    std::uint64_t passed_over = 0;  ///< beat frames sent before one that was processed, but not processed
-    std::uint64_t missing = 0;      ///< cycles without a beat frame
-    std::uint64_t invalid = 0;      ///< cycles in which a beat frame came damaged
-    std::uint64_t overruns = 0;
+    std::uint64_t processed = 0;  ///< beat frames that a list shows to have been processed
+    std::uint64_t missing = 0;    ///< cycles without a beat frame
+    std::uint64_t invalid = 0;    ///< cycles in which a beat frame came damaged
+    std::uint64_t overruns = 0;   ///< cycles that began late
 };
 
 /// Takes what the PC sends to a board and what the board says on the bus, and judges cycle by cycle.
 ///
 /// When a board looks at its inputs the bus does not tell: a beat frame or an ego motion that the PC sent at
-/// about the start of a cycle may belong to it or to the next. So each list is compared with what the replica
-/// says for every input the board can have had, the most likely first: frames are taken in the order they
-/// were sent, none can be taken twice, and what was taken shows in the counters. A list is identical if it
-/// equals one of these in every byte, and the replica goes on from there. A wrong byte cannot hide in this:
-/// CRC, counter and cycle of every frame follow from the state, and there is a handful of inputs against 2^64
-/// values of a frame.
+/// about the start of a cycle may belong to it or to the next, and it may take some cycles until that makes a
+/// difference. So replicas for all inputs the board can have had go on side by side: frames in the order they
+/// were sent, none taken twice. A list is identical if one of them says the same in every byte; those that do
+/// not are dropped, and those that came to the same state are one. A wrong byte cannot hide in this: CRC,
+/// counter and cycle of every frame follow from the state, and there is a handful of inputs against 2^64
+/// values of a frame. What the board took shows in the counters.
 class BoardTwin {
   public:
     explicit BoardTwin(const firmware::RadarConfig& config);
@@ -88,44 +90,54 @@ class BoardTwin {
     /// Nothing has come for long, and nothing will: judges what there is of the current list.
     std::optional<ListVerdict> give_up_list();
 
-    [[nodiscard]] const BoardTwinCounters& counters() const { return counters_; }
-    /// Beat frames sent and not yet accounted for.
-    [[nodiscard]] std::size_t outstanding() const { return beats_.size(); }
+    /// By the most likely inputs.
+    [[nodiscard]] BoardTwinCounters counters() const;
+    /// Beat frames sent and not taken yet.
+    [[nodiscard]] std::size_t outstanding() const { return histories_.front().beats.size(); }
 
   private:
-    /// Beat frames and CAN frames remembered at most: what is older the board will not look at any more.
-    static constexpr std::size_t kMaxBeats = 4;
-    static constexpr std::size_t kMaxBus = 16;
+    /// Beat frames, CAN frames and histories kept at most. Of what is older the board has none left.
+    static constexpr std::size_t kMaxBeats = 64;
+    static constexpr std::size_t kMaxBus = 12;
+    static constexpr std::size_t kMaxHistories = 12;
+    /// Beat frames the board may have taken next; all of kMaxBeats only when these explain nothing.
+    static constexpr std::size_t kLikelyBeats = 2;
 
     struct SentBeat {
         std::uint32_t sequence;
         dsp::BeatFrame frame;
     };
-    /// Inputs the board can have had, and what follows from them.
+    /// What the board may have done so far.
+    struct History {
+        std::shared_ptr<const FirmwareReplica> replica;
+        std::deque<std::shared_ptr<const SentBeat>> beats;  ///< not taken yet
+        std::deque<can::Frame> bus;                         ///< not read yet
+        BoardTwinCounters counters = {};                    ///< those of the inputs
+    };
+    /// What it may have done in the current cycle.
     struct Candidate {
-        hal::BeatResult beat;
-        std::size_t beat_index;  ///< into beats_, for BeatResult::ok
-        bool overrun;
-        std::size_t bus_count;  ///< of bus_, from the front
-        std::unique_ptr<FirmwareReplica> after;
+        History after;
         std::vector<can::Frame> list;
+        hal::BeatResult beat;
+        std::uint32_t sequence;
     };
 
     [[nodiscard]] bool header_and_objects_there() const;
-    [[nodiscard]] std::vector<Candidate> possible_inputs() const;
-    void evaluate(Candidate& candidate) const;
+    void find_candidates(std::size_t beats);
+    void add_candidate(const History& before, hal::BeatResult beat, std::size_t beat_index, bool overrun,
+                       std::size_t bus_count);
     std::optional<ListVerdict> judge(bool whole);
-    ListVerdict settle(Candidate& chosen, std::string difference);
+    ListVerdict settle(const std::vector<const Candidate*>& chosen, std::string difference);
 
-    std::unique_ptr<FirmwareReplica> replica_;
-    std::deque<SentBeat> beats_;
-    std::deque<can::Frame> bus_;
+    std::vector<History> histories_;  ///< most likely first; never empty
     std::vector<can::Frame> list_;
     std::vector<Candidate> candidates_;  ///< for list_; emptied when the inputs change
     bool settled_ = true;                ///< nothing more is expected of list_
     bool pass_over_rest_ = false;        ///< of list_, which has been reported already
     std::uint8_t overruns_before_ = 0;   ///< as the last status said
-    BoardTwinCounters counters_;
+    std::uint64_t lists_ = 0;
+    std::uint64_t different_ = 0;
+    std::uint64_t can_frames_ = 0;
 };
 
 /// "411#0102030405060708", as cansend takes it.

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "host_sim/hil.hpp"
 #include "host_sim/live_view.hpp"
 #include "host_sim/plots.hpp"
 #include "host_sim/simulation.hpp"
@@ -27,6 +28,7 @@ Examples:
   radar_sim --scenario four-targets --plot out --log out/can.log
   radar_sim --scenario highway --tracker jpda --seed 7 --json result.json
   radar_sim --scenario approach --can vcan0 --realtime        (candump vcan0, or radar_monitor vcan0, in another terminal)
+  radar_sim --hil /dev/ttyUSB1 --can can0 --scenario approach (beat frames to a board; its CAN frames compared with the PC's)
   radar_sim --replay frames.bin --waveform waveform.json
   radar_sim --traffic traffic.csv --ego ego.csv --plot out
 
@@ -41,7 +43,8 @@ constexpr const char* kFormats = R"(
   ego       CSV with columns time_s, speed_mps
   detections  CSV with columns frame, range_m, range_rate_mps, snr_db
 
-Exit status: 0 the run went to its end; 1 wrong usage, bad input or a file that cannot be read or written.)";
+Exit status: 0 the run went to its end; 1 wrong usage, bad input or a file that cannot be read or written;
+2 with --hil: the board's CAN frames differ from the PC's, or it did not process every frame.)";
 
 void list_scenarios() {
     for (const auto& name : sim::shipped_scenarios())
@@ -65,6 +68,7 @@ struct Arguments {
     std::string plot;
     bool realtime = false;
     bool list = false;
+    sim::HilOptions hil;
 };
 
 void resolve(Arguments& a, bool frames_given) {
@@ -84,7 +88,46 @@ void resolve(Arguments& a, bool frames_given) {
     if (!a.waveform.empty()) o.waveform = sim::read_waveform(a.waveform);
 }
 
+/// Created before the run, so that a path that cannot be written costs no run.
+std::ofstream create_json(const Arguments& a) {
+    std::ofstream file;
+    if (!a.json.empty()) {
+        file.open(a.json);
+        if (!file) throw sim::InputError(a.json + ": cannot be created");
+    }
+    return file;
+}
+
+void write_json(const Arguments& a, std::ofstream& file, const nlohmann::json& json) {
+    file << json.dump(2) << '\n';
+    if (!file.flush()) throw sim::InputError(a.json + ": cannot be written, is the disk full?");
+    if (!a.options.quiet) std::printf("wrote %s\n", a.json.c_str());
+}
+
+/// A board in place of the firmware in this process.
+int run_board(const Arguments& a) {
+    std::ofstream json = create_json(a);
+    std::uint64_t shown = 0;
+    std::size_t told = 0;
+    const sim::HilReport report = sim::run_hil(a.options, a.hil, [&](const sim::HilReport& r) {
+        for (; told < r.differences.size(); ++told)
+            std::printf("different: %s\n", r.differences[told].c_str());
+        if (a.options.quiet || r.board.lists < shown + 10) return;
+        shown = r.board.lists;
+        std::printf("frame %llu: %llu lists, %llu CAN frames compared, %llu lists different\n",
+                    static_cast<unsigned long long>(r.frames_sent),
+                    static_cast<unsigned long long>(r.board.lists),
+                    static_cast<unsigned long long>(r.board.can_frames),
+                    static_cast<unsigned long long>(r.board.different));
+        std::fflush(stdout);
+    });
+    std::fputs(sim::to_text(report).c_str(), stdout);
+    if (json.is_open()) write_json(a, json, sim::to_json(report));
+    return report.identical() ? 0 : 2;
+}
+
 int run(const Arguments& a) {
+    if (!a.hil.serial.empty()) return run_board(a);
     sim::Simulation simulation(a.options);
     std::optional<sim::Plots> plots;
     if (!a.plot.empty()) {
@@ -118,11 +161,7 @@ int run(const Arguments& a) {
         for (const auto& picture : plots->draw())
             if (!a.options.quiet) std::printf("wrote %s\n", picture.c_str());
     }
-    if (!a.json.empty()) {
-        json << sim::to_json(result).dump(2) << '\n';
-        if (!json.flush()) throw sim::InputError(a.json + ": cannot be written, is the disk full?");
-        if (!a.options.quiet) std::printf("wrote %s\n", a.json.c_str());
-    }
+    if (json.is_open()) write_json(a, json, sim::to_json(result));
     return 0;
 }
 
@@ -148,23 +187,34 @@ int main(int argc, char** argv) {
     app.add_option("--ego", o.ego, "own speed for a recording; not given, the radar is told none");
     auto* frames = app.add_option("--frames", a.frames, "stop after so many frames of 0.1 s");
     app.add_option("--seed", o.seed, "of noise, fluctuation and clutter")->capture_default_str();
-    app.add_option("--tracker", a.tracker, "data association: " + tracker_names())->capture_default_str();
+    auto* tracker =
+        app.add_option("--tracker", a.tracker, "data association: " + tracker_names())->capture_default_str();
     app.add_option("--can", o.bus, "CAN interface, or loopback: a bus inside this program")
         ->capture_default_str();
     app.add_option("--log", o.log, "write all CAN traffic, in the format of candump -L");
-    app.add_option("--record", o.record, "write the beat frames");
+    auto* record = app.add_option("--record", o.record, "write the beat frames");
     app.add_option("--json", a.json, "write the summary");
-    app.add_option("--plot", a.plot, "directory for pictures of the run (needs gnuplot)");
+    auto* plot = app.add_option("--plot", a.plot, "directory for pictures of the run (needs gnuplot)");
     auto* realtime = app.add_flag("--realtime", a.realtime, "one second a second; else as fast as possible");
-    app.add_option("--speed", o.speed, "so many seconds in one second")
-        ->check(CLI::PositiveNumber)
-        ->excludes(realtime);
+    auto* speed = app.add_option("--speed", o.speed, "so many seconds in one second")
+                      ->check(CLI::PositiveNumber)
+                      ->excludes(realtime);
+    auto* hil =
+        app.add_option("--hil", a.hil.serial,
+                       "a board that runs the firmware: serial line to send it beat frames on; --can names "
+                       "the bus it is on")
+            ->excludes(detections);
+    auto* lockstep = app.add_flag(
+        "--lockstep", a.hil.lockstep,
+        "with --hil: the next frame after the last CAN frame of the one before; else in real time");
+    lockstep->needs(hil);
     app.add_flag("--quiet", o.quiet, "no output but errors");
     for (auto* input : {scenario, replay, traffic, detections}) {
         for (auto* other : {scenario, replay, traffic, detections, list})
             if (input != other) input->excludes(other);
     }
     waveform->excludes(scenario);
+    for (auto* other : {tracker, record, plot, realtime, speed, list}) hil->excludes(other);
 
     try {
         app.parse(argc, argv);

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <ctime>
-#include <utility>
+#include <memory>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -103,38 +103,21 @@ std::string explain(const std::string& path, std::uint32_t baud, int cause) {
 
 }  // namespace
 
-std::optional<SerialPort> SerialPort::open(const std::string& path, std::uint32_t baud, std::string& error) {
+Opened<SerialPort> SerialPort::open(const std::string& path, std::uint32_t baud) {
+    const auto fail = [&] { return Opened<SerialPort>{.error = explain(path, baud, errno)}; };
     struct stat status {};
-    if (stat(path.c_str(), &status) != 0) {
-        error = explain(path, baud, errno);
-        return std::nullopt;
-    }
-    if (S_ISSOCK(status.st_mode)) {
-        const int fd = connect_socket(path);
-        if (fd < 0) {
-            error = explain(path, baud, errno);
-            return std::nullopt;
-        }
-        return SerialPort(fd, false);
-    }
-    const int fd = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (fd < 0) {
-        error = explain(path, baud, errno);
-        return std::nullopt;
-    }
-    SerialPort port(fd, true);
+    if (stat(path.c_str(), &status) != 0) return fail();
+    const bool tty = !S_ISSOCK(status.st_mode);
+    const int fd =
+        tty ? ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC) : connect_socket(path);
+    if (fd < 0) return fail();
+    Opened<SerialPort> port{.value = std::unique_ptr<SerialPort>(new SerialPort(fd, tty))};
     // Two writers would mix their bytes without either noticing.
-    if (!configure(fd, baud) || ioctl(fd, TIOCEXCL) != 0) {
-        error = explain(path, baud, errno);
-        return std::nullopt;
-    }
+    if (tty && (!configure(fd, baud) || ioctl(fd, TIOCEXCL) != 0)) return fail();
     return port;
 }
 
-SerialPort::SerialPort(SerialPort&& other) noexcept : fd_(std::exchange(other.fd_, -1)), tty_(other.tty_) {}
-
 SerialPort::~SerialPort() {
-    if (fd_ < 0) return;
     if (tty_) ioctl(fd_, TIOCNXCL);
     close(fd_);
 }

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
+
+#include "hal/host/opened.hpp"
 
 namespace hal {
 
@@ -18,14 +19,11 @@ enum class SerialResult : std::uint8_t {
 /// comes from the other end is read and thrown away, so that it cannot stand still because nobody listens.
 class SerialPort {
   public:
-    /// Empty when the line cannot be had; `error` then names cause and remedy. `baud` means nothing to a
-    /// socket.
-    [[nodiscard]] static std::optional<SerialPort> open(const std::string& path, std::uint32_t baud,
-                                                        std::string& error);
-
-    SerialPort(SerialPort&& other) noexcept;
-    SerialPort& operator=(SerialPort&&) = delete;
+    /// Error: cause and remedy. `baud` means nothing to a socket.
+    [[nodiscard]] static Opened<SerialPort> open(const std::string& path, std::uint32_t baud);
     ~SerialPort();
+    SerialPort(const SerialPort&) = delete;
+    SerialPort& operator=(const SerialPort&) = delete;
 
     /// Returns when the last byte has left the PC (as far as the driver can tell), after `timeout_ms` at
     /// most.

@@ -59,9 +59,8 @@ TEST_GROUP(SerialPort){};
 
 TEST(SerialPort, EveryByteArrivesUnchangedOverATerminal) {
     Pty pty;
-    std::string error;
-    auto port = hal::SerialPort::open(pty.path, 1'000'000, error);
-    CHECK_TRUE(port.has_value());
+    auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
     const auto sent = every_byte(3 * 8208);
     std::vector<std::uint8_t> received;
     std::thread reader([&] { received = read_all(pty.master, sent.size()); });
@@ -73,9 +72,8 @@ TEST(SerialPort, EveryByteArrivesUnchangedOverATerminal) {
 
 TEST(SerialPort, SetsTheBaudRate) {
     Pty pty;
-    std::string error;
-    const auto port = hal::SerialPort::open(pty.path, 1'000'000, error);
-    CHECK_TRUE(port.has_value());
+    const auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
     termios settings{};
     CHECK_EQUAL(0, tcgetattr(pty.master, &settings));
     CHECK_EQUAL(static_cast<unsigned>(B1000000), static_cast<unsigned>(cfgetospeed(&settings)));
@@ -83,33 +81,28 @@ TEST(SerialPort, SetsTheBaudRate) {
 
 TEST(SerialPort, AnUnknownBaudRateIsRefused) {
     Pty pty;
-    std::string error;
-    CHECK_FALSE(hal::SerialPort::open(pty.path, 12'345, error).has_value());
-    STRCMP_CONTAINS("12345 baud", error.c_str());
+    STRCMP_CONTAINS("12345 baud", hal::SerialPort::open(pty.path, 12'345).error.c_str());
 }
 
 TEST(SerialPort, GivesUpWhenTheOtherEndTakesNothing) {
     Pty pty;
-    std::string error;
-    auto port = hal::SerialPort::open(pty.path, 1'000'000, error);
-    CHECK_TRUE(port.has_value());
+    auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
     CHECK_TRUE(port->write(every_byte(1 << 20), 50) == hal::SerialResult::timeout);
 }
 
 TEST(SerialPort, ReportsThatTheOtherEndIsGone) {
     Pty pty;
-    std::string error;
-    auto port = hal::SerialPort::open(pty.path, 1'000'000, error);
-    CHECK_TRUE(port.has_value());
+    auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
     pty.hang_up();
     CHECK_TRUE(port->write(every_byte(100), 1000) == hal::SerialResult::failed);
 }
 
 TEST(SerialPort, WhatTheOtherEndSaysDoesNotStopIt) {
     Pty pty;
-    std::string error;
-    auto port = hal::SerialPort::open(pty.path, 1'000'000, error);
-    CHECK_TRUE(port.has_value());
+    auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
     const auto chatter = every_byte(1000);
     CHECK_EQUAL(1000, write(pty.master, chatter.data(), chatter.size()));
     std::vector<std::uint8_t> received;
@@ -121,12 +114,10 @@ TEST(SerialPort, WhatTheOtherEndSaysDoesNotStopIt) {
 }
 
 TEST(SerialPort, NamesCauseAndRemedy) {
-    std::string error;
-    CHECK_FALSE(hal::SerialPort::open("/dev/no-such-line", 1'000'000, error).has_value());
-    STRCMP_CONTAINS("/dev/no-such-line", error.c_str());
-    STRCMP_CONTAINS("plugged in", error.c_str());
-    CHECK_FALSE(hal::SerialPort::open("/dev/null", 1'000'000, error).has_value());
-    STRCMP_CONTAINS("neither a serial device nor a socket", error.c_str());
+    STRCMP_CONTAINS("/dev/no-such-line", hal::SerialPort::open("/dev/no-such-line", 1'000'000).error.c_str());
+    STRCMP_CONTAINS("plugged in", hal::SerialPort::open("/dev/no-such-line", 1'000'000).error.c_str());
+    STRCMP_CONTAINS("neither a serial device nor a socket",
+                    hal::SerialPort::open("/dev/null", 1'000'000).error.c_str());
 }
 
 TEST(SerialPort, SpeaksToASocket) {
@@ -139,9 +130,8 @@ TEST(SerialPort, SpeaksToASocket) {
     path.copy(address.sun_path, sizeof(address.sun_path) - 1);
     CHECK_EQUAL(0, bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof(address)));
     CHECK_EQUAL(0, listen(listener, 1));
-    std::string error;
-    auto port = hal::SerialPort::open(path, 1'000'000, error);
-    CHECK_TRUE(port.has_value());
+    auto port = hal::SerialPort::open(path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
     const int other = accept(listener, nullptr, nullptr);
     const auto sent = every_byte(8208);
     std::vector<std::uint8_t> received;

@@ -143,7 +143,7 @@ run_emulated() {
     chmod +x "$share/command"
 
     mkfifo "$scratch/output"
-    local boot_s=60
+    local boot_s=120
     timeout -k 5 $((timeout_s + boot_s)) qemu-system-x86_64 -M pc -accel tcg,thread=multi -cpu max -smp 2 -m 2048 \
         -kernel "$cache/vmlinuz" -initrd "$cache/initramfs.gz" -append "console=ttyS0 panic=-1 quiet" \
         -nodefaults -display none -no-reboot -serial "file:$scratch/boot.txt" \
