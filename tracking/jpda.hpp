@@ -160,49 +160,52 @@ bool exact_marginals(JpdaGraph<S, Capacity>& graph, std::span<S> table, std::spa
 
     // used[U]: weight of everything up to step k with exactly U used. Each step's shares are taken of its own
     // total, so the scales of the tables cancel.
+    used = used.first(sets);
     used[0] = S(1);
     for (std::size_t set = 1; set < sets; ++set) used[set] = S(0);
     for (int k = 0; k < steps; ++k) {
         const std::span<S> after = backward(k);
         const auto step = static_cast<std::size_t>(k);
         const S alone = graph.step_alone[step];
-        std::array<WideSum<S>, static_cast<std::size_t>(Capacity.items)> through{};
+        const std::size_t adjacent = graph.adjacent[step];
+        std::array<S, static_cast<std::size_t>(Capacity.items)> w;
+        std::array<WideSum<S>, static_cast<std::size_t>(Capacity.items)> through;
+        for (std::size_t left = adjacent; left != 0; left &= left - 1) {
+            const auto item = static_cast<std::size_t>(std::countr_zero(left));
+            w[item] = weight(k, static_cast<int>(item));
+            through[item] = WideSum<S>();
+        }
         WideSum<S> past;
-        for (std::size_t set = 0; set < sets; ++set) {
-            const S w = used[set];
-            if (w == S(0)) continue;
-            past.add_product(w, after[set]);
-            for (std::size_t left = graph.adjacent[step] & ~set; left != 0; left &= left - 1) {
-                const int item = std::countr_zero(left);
-                through[static_cast<std::size_t>(item)].add_product(w, after[set | (std::size_t{1} << item)]);
-            }
-        }
-        past = past.scaled(alone);
-        WideSum<S> total = past;
-        for (std::size_t left = graph.adjacent[step]; left != 0; left &= left - 1) {
-            const int item = std::countr_zero(left);
-            WideSum<S>& sum = through[static_cast<std::size_t>(item)];
-            sum = sum.scaled(weight(k, item));
-            total += sum;
-        }
-        if (!total.positive()) return false;
-
         // Descending, so that the sets a set is built from are still those of the step before.
         for (std::size_t set = sets; set-- > 0;) {
+            const S next = after[set];
+            const S here = used[set];
             WideSum<S> sum;
-            sum.add_product(used[set], alone);
-            for (std::size_t left = graph.adjacent[step] & set; left != 0; left &= left - 1) {
-                const int item = std::countr_zero(left);
-                sum.add_product(used[set ^ (std::size_t{1} << item)], weight(k, item));
+            sum.add_product(here, alone);
+            past.add_product(here, next);
+            for (std::size_t left = adjacent & set; left != 0; left &= left - 1) {
+                const auto item = static_cast<std::size_t>(std::countr_zero(left));
+                const S before = used[set ^ (std::size_t{1} << item)];
+                sum.add_product(before, w[item]);
+                through[item].add_product(before, next);
             }
             used[set] = sum.value();
         }
         rescale(used);
 
-        graph.step_alone[step] = share(past, total);
-        for (std::size_t left = graph.adjacent[step]; left != 0; left &= left - 1) {
-            const int item = std::countr_zero(left);
-            weight(k, item) = share(through[static_cast<std::size_t>(item)], total);
+        past = past.scaled(alone);
+        WideSum<S> total = past;
+        for (std::size_t left = adjacent; left != 0; left &= left - 1) {
+            const auto item = static_cast<std::size_t>(std::countr_zero(left));
+            through[item] = through[item].scaled(w[item]);
+            total += through[item];
+        }
+        if (!total.positive()) return false;
+        const typename WideSum<S>::Whole whole(total);
+        graph.step_alone[step] = past.share(whole);
+        for (std::size_t left = adjacent; left != 0; left &= left - 1) {
+            const auto item = static_cast<std::size_t>(std::countr_zero(left));
+            weight(k, static_cast<int>(item)) = through[item].share(whole);
         }
     }
 
@@ -217,9 +220,9 @@ bool exact_marginals(JpdaGraph<S, Capacity>& graph, std::span<S> table, std::spa
             unused[static_cast<std::size_t>(std::countr_zero(left))] += w;
     }
     if (!total.positive()) return false;
-    for (int item = 0; item < items; ++item)
-        graph.item_alone[static_cast<std::size_t>(item)] =
-            share(unused[static_cast<std::size_t>(item)], total);
+    const typename WideSum<S>::Whole whole(total);
+    for (std::size_t item = 0; item < static_cast<std::size_t>(items); ++item)
+        graph.item_alone[item] = unused[item].share(whole);
     return true;
 }
 
@@ -258,9 +261,10 @@ void approximate_marginals(std::span<AssociationRow<S>> rows, std::uint32_t clus
                 total.add(wish[c]);
             }
             if (sweep == kBeliefSweeps) {
+                const typename WideSum<S>::Whole whole(total);
                 for (std::size_t c = 0; c < static_cast<std::size_t>(row.count); ++c)
-                    if (!is_private(row.item[c])) row.item[c].beta = share(WideSum<S>(wish[c]), total);
-                row.missed = share(WideSum<S>(row.missed), total);
+                    if (!is_private(row.item[c])) row.item[c].beta = WideSum<S>(wish[c]).share(whole);
+                row.missed = WideSum<S>(row.missed).share(whole);
                 continue;
             }
             for (std::size_t c = 0; c < static_cast<std::size_t>(row.count); ++c) {

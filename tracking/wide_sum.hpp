@@ -52,25 +52,41 @@ class WideSum {
         return out;
     }
 
-    /// The sum as S: rounded half to even, saturated.
+    /// The sum as S: rounded to nearest (a tie goes up), saturated.
     [[nodiscard]] S value() const {
         if constexpr (std::floating_point<S>) {
             return sum_;
         } else {
-            return S::from_raw(dsp::saturate32(dsp::round_shift(sum_, S::fraction_bits)));
+            constexpr std::int64_t kHalf = std::int64_t{1} << (S::fraction_bits - 1);
+            return S::from_raw(dsp::saturate32((sum_ + kHalf) >> S::fraction_bits));
         }
     }
 
-    /// part / whole for 0 <= part <= whole, whole > 0; in fixed point within one LSB of S plus 2^-30, as long
-    /// as whole is at least 2^-F.
-    friend S share(const WideSum& part, const WideSum& whole) {
+    /// Divides parts by a whole: `part.share(Whole(whole))`, one division for all parts. 0 <= part <= whole,
+    /// whole > 0; in fixed point within one LSB of S plus 2^-29, as long as the whole is at least 2^-F.
+    class Whole {
+      public:
+        explicit Whole(const WideSum& whole) : inverse_(reciprocal(normalised(whole))) {}
+
+      private:
+        friend class WideSum;
+        S normalised(const WideSum& whole) {
+            if constexpr (std::floating_point<S>) {
+                return whole.sum_;
+            } else {
+                const int width = 64 - std::countl_zero(static_cast<std::uint64_t>(whole.sum_));
+                drop_ = width > 30 ? width - 30 : 0;
+                return S::from_raw(static_cast<std::int32_t>(whole.sum_ >> drop_));
+            }
+        }
+        int drop_ = 0;
+        decltype(reciprocal(S{})) inverse_;
+    };
+    [[nodiscard]] S share(const Whole& whole) const {
         if constexpr (std::floating_point<S>) {
-            return part.sum_ / whole.sum_;
+            return sum_ * whole.inverse_;
         } else {
-            const int width = 64 - std::countl_zero(static_cast<std::uint64_t>(whole.sum_));
-            const int drop = width > 30 ? width - 30 : 0;
-            return dsp::divide(S::from_raw(dsp::saturate32(part.sum_ >> drop)),
-                               S::from_raw(static_cast<std::int32_t>(whole.sum_ >> drop)));
+            return S::from_raw(dsp::saturate32(sum_ >> whole.drop_)) * whole.inverse_;
         }
     }
 
