@@ -11,13 +11,13 @@ namespace sim {
 namespace {
 
 std::vector<std::string_view> split(std::string_view line) {
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    constexpr std::string_view kBlank = " \t\r";  // some writers put line ends into the middle of a row
     std::vector<std::string_view> cells;
     for (;;) {
         const auto comma = line.find(',');
         auto cell = line.substr(0, comma);
-        while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
-        while (!cell.empty() && cell.back() == ' ') cell.remove_suffix(1);
+        cell.remove_prefix(std::min(cell.find_first_not_of(kBlank), cell.size()));
+        cell.remove_suffix(cell.size() - 1 - cell.find_last_not_of(kBlank));
         cells.push_back(cell);
         if (comma == std::string_view::npos) return cells;
         line.remove_prefix(comma + 1);

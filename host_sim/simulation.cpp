@@ -149,6 +149,7 @@ firmware::RadarConfig radar_config(const dsp::Waveform& waveform, int adc_bits,
     const dsp::CellScale cell = waveform.scale();
     config.tracker.associator = tracker;
     config.tracker.motion.period_s = Real::ratio(waveform.period_ms, 1000);
+    config.tracker.modes.period_s = config.tracker.motion.period_s;
     config.tracker.gate.rate_span_mps = cell.rate_cell_mps * dsp::kDopplerCells;
     config.tracker.gate.alias_range_m = cell.coupling_s * config.tracker.gate.rate_span_mps;
     config.tracker.resolution_range_m = cell.range_cell_m * 2;

@@ -26,7 +26,7 @@ TEST_GROUP(Csv) {
 };
 
 TEST(Csv, ReadsColumnsByNameInAnyOrderAndSkipsTheOthers) {
-    std::ofstream(file) << "speed_mps, note,time_s\r\n1.5,x,0\n\n-2e1, ,0.25\r\n";
+    std::ofstream(file) << "speed_mps, note,time_s\r\n1.5\r,x,0\n\n-2e1, ,0.25\r\n";
     const auto rows = sim::read_csv(file, {"time_s", "speed_mps"});
     LONGS_EQUAL(2, rows.size());
     DOUBLES_EQUAL(0, rows[0][0], 0);
