@@ -32,22 +32,38 @@ Plan read_plan(const std::filesystem::path& directory, std::uint64_t seed) {
         plan.geometries.push_back(read_study_geometry(path));
         return plan.geometries.size() - 1;
     };
+    const auto refuse = [&](const std::string& reason) { throw InputError(file.string() + ": " + reason); };
+    const auto short_name_of = [&](std::size_t geometry) {
+        const std::string& name = plan.geometries[geometry].name;
+        const std::string prefix = std::string(kName) + "-";
+        return name.starts_with(prefix) ? name.substr(prefix.size()) : name;
+    };
+    const auto add_condition = [&](std::size_t g, const std::string& what, const StudyCondition& seen,
+                                   bool base) {
+        const auto within = [](double v, double low, double high) { return v >= low && v <= high; };
+        if (!within(seen.clutter_density, 0, 1)) refuse("clutter_density must be 0 .. 1");
+        if (!within(seen.detection_probability, 0.01, 1)) refuse("detection_probability must be 0.01 .. 1");
+        if (!within(seen.spacing, 0.01, 100)) refuse("spacing must be 0.01 .. 100");
+        if (!within(seen.gate, 0.1, 100)) refuse("gate must be 0.1 .. 100");
+        plan.conditions.push_back({short_name_of(g) + ", " + what, g, seen, base});
+    };
+    if (!json.is_object()) refuse("must be an object");
+    for (const auto& [key, value] : json.items())
+        if (key != "description" && key != "geometries" && key != "clutter_density" && key != "sweeps" &&
+            key != "unresolved")
+            refuse("unknown field \"" + key +
+                   "\"; known: description, geometries, clutter_density, sweeps, unresolved");
     try {
         const auto densities = json.at("clutter_density").get<std::vector<double>>();
         const StudyCondition middle;
         for (const auto& name : json.at("geometries")) {
             const std::size_t g = add_geometry(name.get<std::string>());
-            const auto add = [&](const std::string& what, const StudyCondition& seen, bool base) {
-                plan.conditions.push_back(
-                    {plan.geometries[g].name.substr(std::string(kName).size() + 1) + ", " + what, g, seen,
-                     base});
-            };
             for (const double density : densities) {
                 StudyCondition seen = middle;
                 seen.clutter_density = density;
                 const bool base = density == middle.clutter_density;
                 if (base && g == 0) plan.pictured = plan.conditions.size();
-                add("clutter " + short_number(density), seen, base);
+                add_condition(g, "clutter " + short_number(density), seen, base);
             }
             for (const auto& [axis, values] : json.at("sweeps").items()) {
                 for (const double value : values.get<std::vector<double>>()) {
@@ -67,7 +83,7 @@ Plan read_plan(const std::filesystem::path& directory, std::uint64_t seed) {
                     const std::string short_name = axis == "clutter_density"         ? "clutter"
                                                    : axis == "detection_probability" ? "PD"
                                                                                      : axis;
-                    add(short_name + " " + short_number(value), seen, false);
+                    add_condition(g, short_name + " " + short_number(value), seen, false);
                 }
             }
         }
@@ -77,7 +93,7 @@ Plan read_plan(const std::filesystem::path& directory, std::uint64_t seed) {
             StudyCondition seen = middle;
             seen.merging = true;
             seen.clutter_density = density;
-            plan.conditions.push_back({"unresolved, clutter " + short_number(density), g, seen, false});
+            add_condition(g, "clutter " + short_number(density), seen, false);
         }
     } catch (const nlohmann::json::exception& e) {
         throw InputError(file.string() + ": " + e.what());

@@ -80,7 +80,8 @@ Tables make_tables(const Plan& plan, const std::vector<StudyFilter>& filters, co
 /// Table 3, measured now: no two are alike.
 std::string cost_table(const std::vector<StudyFilter>& filters);
 
-/// Figures 4 to 13, and losses over clutter density. Throws InputError.
+/// Figures 4 to 13, losses over clutter density, and in fig15/ the whole radar on the scenario four-targets.
+/// Throws InputError.
 void draw_pictures(const std::filesystem::path& directory, const Plan& plan,
                    const std::vector<StudyFilter>& filters, const Scores& scores, std::uint64_t seed);
 

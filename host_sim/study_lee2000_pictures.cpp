@@ -3,6 +3,8 @@
 
 #include "host_sim/gnuplot.hpp"
 #include "host_sim/json_fields.hpp"
+#include "host_sim/plots.hpp"
+#include "host_sim/simulation.hpp"
 #include "host_sim/study_lee2000_parts.hpp"
 
 namespace sim::lee2000 {
@@ -15,7 +17,7 @@ std::ofstream create(const std::filesystem::path& file) {
     return out;
 }
 
-constexpr const char* kGrid = "set grid lc rgb '#dddddd'\nset xlabel 'time / s'\n";
+constexpr const char* kGrid = "set grid lt 1 lw 0.5 lc rgb '#dddddd'\nset xlabel 'time / s'\n";
 
 class Pictures {
   public:
@@ -60,7 +62,7 @@ class Pictures {
         hits.flush();
         clutter.flush();
         std::ostringstream gp;
-        gp << kGrid
+        gp << kGrid << "set xrange [0:" << geometry_.duration_s << "]\nset lmargin 9\n"
            << "set key outside top right\nset multiplot layout 2,1 title 'Noisy targets and clutter ("
            << condition_.label << ")'\n";
         for (const int column : {2, 3})
@@ -87,7 +89,7 @@ class Pictures {
         }
         // Two pairs far from each other: the vertical axis follows each.
         std::ostringstream gp;
-        gp << kGrid
+        gp << kGrid << "set xrange [0:" << geometry_.duration_s << "]\nset lmargin 9\n"
            << "set palette maxcolors 4 defined (1 '#d62728', 2 '#1f77b4', 3 '#2ca02c', 4 '#9467bd')\n"
            << "unset colorbox\nset cbrange [0.5:4.5]\nset key top left\nset multiplot layout "
            << geometry_.pairs.size() << ",1 title 'Tracking four targets using " << filter.name << " ("
@@ -126,7 +128,7 @@ class Pictures {
             }
         }
         std::ostringstream gp;
-        gp << kGrid
+        gp << kGrid << "set xrange [0:" << geometry_.duration_s << "]\nset lmargin 9\n"
            << "set key outside top right\nset yrange [0:1]\nset ylabel 'probability of correct association'\n"
            << "set title 'Target " << target + 1 << " (" << condition_.label << ", mean of all runs)'\nplot ";
         for (std::size_t i = 0; i < kDrawn.size(); ++i)
@@ -161,7 +163,7 @@ class Pictures {
                 }
             }
             std::ostringstream gp;
-            gp << kGrid << "set key outside top right\nset logscale x\n"
+            gp << kGrid << "set key outside top right\nset lmargin 9\nset logscale x\n"
                << "set xlabel 'clutter, false measurements a frame per m (m/s)'\nset yrange [0:*]\n"
                << "set multiplot layout 2,1 title '" << plan_.geometries[g].description << "'\n";
             for (const int own : {0, 1}) {
@@ -191,9 +193,22 @@ class Pictures {
 
 }  // namespace
 
+void draw_figure_15(const std::filesystem::path& directory) {
+    SimulationOptions options;
+    options.scenario = load_scenario("four-targets");
+    options.tracker = tracking::Associator::ospda;
+    options.quiet = true;
+    Simulation simulation(options);
+    Plots plots(directory / "fig15", "Detection and tracking from beat signals, OSPDA (four-targets)",
+                simulation.waveform(), simulation.frames());
+    while (simulation.step()) plots.add(simulation.view());
+    plots.draw();
+}
+
 void draw_pictures(const std::filesystem::path& directory, const Plan& plan,
                    const std::vector<StudyFilter>& filters, const Scores& scores, std::uint64_t seed) {
     Pictures(directory, plan, seed).draw(filters, scores);
+    draw_figure_15(directory);
 }
 
 }  // namespace sim::lee2000
