@@ -8,6 +8,7 @@
 
 #include "host_sim/study_lee2000.hpp"
 #include "host_sim/study_lowsnr.hpp"
+#include "host_sim/study_multimodel.hpp"
 
 namespace {
 
@@ -27,6 +28,8 @@ Studies:
             probability, spacing and gate. Scenarios: host_sim/studies/lee2000*.json
   lowsnr    2020: iterative JIPDA with amplitude information, levels 0 to 4 and full, and LM-IPDA, on five
             targets at 13 and 20 dB, one- and two-point starts; figures 2 to 5, table 1 and the claims
+  multimodel  Kim, Park, Kim and Ji: IMM-PDAF on vehicles that turn, stop and go, against PDA filters of one
+            model, laser alone or with camera and infrastructure; figures 3 and 4 and the claims
 
 Exit status: 0 finished; 1 wrong usage, bad input or a file that cannot be read or written.)";
 
@@ -36,9 +39,10 @@ struct Study {
     std::size_t runs;
     void (*run)(const sim::StudyOptions&, const sim::StudyRanks&);
 };
-constexpr std::array<Study, 2> kStudies{
+constexpr std::array<Study, 3> kStudies{
     {{"lee2000", "the comparison of Lee and Kim 2000", 200, sim::run_lee2000},
-     {"lowsnr", "iterative JIPDA at low signal-to-noise ratio, 2020", 500, sim::run_lowsnr}}};
+     {"lowsnr", "iterative JIPDA at low signal-to-noise ratio, 2020", 500, sim::run_lowsnr},
+     {"multimodel", "IMM-PDAF with one sensor and three", 500, sim::run_multimodel}}};
 
 }  // namespace
 
