@@ -231,6 +231,8 @@ void PlaneTracker::solve(std::span<const std::size_t> cluster, std::span<const P
     } else if (config_.associator == Associator::ijipda) {
         const auto reached = tracking::ijipda<double>(s.rows, s.existence, config_.iterative, s.work.ijipda);
         report.level = std::min(report.level, reached.level);
+    } else if (config_.sharing && tracking::uses_rank(config_.associator)) {
+        tracking::ihpda<double>(s.rows, s.existence, s.strength, s.rank, *config_.sharing, s.work.ihpda);
     } else {
         tracking::associate<double>(s.rows, {s.existence, s.strength, s.rank}, config_.associator, {},
                                     config_.iterative, s.work);

@@ -56,6 +56,7 @@ struct PlaneTrackerConfig {
     bool use_amplitude = false;
 
     tracking::Associator associator = tracking::Associator::jipda;
+    std::optional<tracking::IhpdaConfig> sharing;  ///< of the rank-based associators, in place of their own
     tracking::IjipdaConfig iterative;  ///< of ijipda; and what a cluster too large for exact jipda gets
 
     TrackStart start = TrackStart::two_point;

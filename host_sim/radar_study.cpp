@@ -6,6 +6,7 @@
 #include <exception>
 #include <string>
 
+#include "host_sim/study_infrared.hpp"
 #include "host_sim/study_lee2000.hpp"
 #include "host_sim/study_lowsnr.hpp"
 #include "host_sim/study_multimodel.hpp"
@@ -28,6 +29,8 @@ Studies:
             probability, spacing and gate. Scenarios: host_sim/studies/lee2000*.json
   lowsnr    2020: iterative JIPDA with amplitude information, levels 0 to 4 and full, and LM-IPDA, on five
             targets at 13 and 20 dB, one- and two-point starts; figures 2 to 5, table 1 and the claims
+  infrared  2013: IHPDA alone, with optimal assignment, with greedy assignment and LM-IHPDA on two formations
+            that cross in images of 1500 x 600 pixels; figures 4 and 5, table 5 and the claims
   multimodel  Kim, Park, Kim and Ji: IMM-PDAF on vehicles that turn, stop and go, against PDA filters of one
             model, laser alone or with camera and infrastructure; figures 3 and 4 and the claims
 
@@ -39,9 +42,10 @@ struct Study {
     std::size_t runs;
     void (*run)(const sim::StudyOptions&, const sim::StudyRanks&);
 };
-constexpr std::array<Study, 3> kStudies{
+constexpr std::array<Study, 4> kStudies{
     {{"lee2000", "the comparison of Lee and Kim 2000", 200, sim::run_lee2000},
      {"lowsnr", "iterative JIPDA at low signal-to-noise ratio, 2020", 500, sim::run_lowsnr},
+     {"infrared", "LM-IHPDA in infrared image sequences, 2013", 30, sim::run_infrared},
      {"multimodel", "IMM-PDAF with one sensor and three", 500, sim::run_multimodel}}};
 
 }  // namespace
