@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . toolchains/packages.sh
-install_packages $HOST_PACKAGES cpputest
+install_packages $HOST_PACKAGES
 
 cmake --preset host >/dev/null
 cmake --build --preset host -j "$(nproc)" --target radar_sim radar_monitor

@@ -1,45 +1,53 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds every configuration, runs every test.
+# Installs what is missing, builds every configuration for PC and boards, checks format and lint, runs every test.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . toolchains/packages.sh
-install_packages $HOST_PACKAGES $TEST_PACKAGES
+install_packages $HOST_PACKAGES $TEST_PACKAGES $BOARD_PACKAGES $VCAN_PACKAGES
 
 jobs=$(nproc)
+boards="zcu102-r5 mps2-an500 mps2-an386"
 total_passed=0 total_failed=0 total_skipped=0
 
-# run_tests PRESET [ctest option...]: one summary for all presets at the end, whatever fails on the way.
+# run_tests PRESET [ctest option...]: goes on after a failure; the sum of all presets is printed at the end.
 run_tests() {
-    local preset=$1 log
+    local preset=$1 log of failed skipped
     shift
     log=$(mktemp)
-    echo "== ctest --preset $preset"
-    ctest --preset "$preset" -j "$jobs" "$@" 2>&1 | tee "$log" || true
-    local of failed skipped
-    of=$(sed -nE 's/.*tests? passed, ([0-9]+) tests? failed out of ([0-9]+).*/\2/p' "$log" | tail -1)
-    failed=$(sed -nE 's/.*tests? passed, ([0-9]+) tests? failed out of ([0-9]+).*/\1/p' "$log" | tail -1)
+    echo "== ctest --preset $preset $*"
+    ctest --preset "$preset" "$@" 2>&1 | tee "$log" || true
+    of=$(sed -nE 's/.*tests passed, ([0-9]+) tests failed out of ([0-9]+).*/\2/p' "$log" | tail -1)
+    failed=$(sed -nE 's/.*tests passed, ([0-9]+) tests failed out of ([0-9]+).*/\1/p' "$log" | tail -1)
     skipped=$(grep -cE '\*\*\*Skipped' "$log" || true)
     rm -f "$log"
     if [ -z "$of" ]; then
         echo "ctest --preset $preset printed no summary" >&2
-        of=1 failed=1
+        of=1 failed=1 skipped=0
     fi
     total_failed=$((total_failed + failed))
     total_skipped=$((total_skipped + skipped))
     total_passed=$((total_passed + of - failed - skipped))
 }
 
-for preset in host host-debug host-clang; do
-    echo "== build $preset"
-    cmake --preset "$preset" >/dev/null
-    cmake --build --preset "$preset" -j "$jobs"
-done
+build() {
+    echo "== build $*"
+    cmake --preset "$1" >/dev/null
+    cmake --build --preset "$@" -j "$jobs"
+}
+build host
+for board in $boards; do build "$board"; done
+build host-debug
+build host-clang --target radar_sim dsp_detect_test
+
+echo "== format and lint"
 cmake --build --preset host --target format-check
 cmake --build --preset host --target tidy
 
-run_tests host
-run_tests host-debug
+run_tests host -j "$jobs" -LE vcan
 run_tests host-clang -L bit-exact
+run_tests host-debug -j "$jobs"
+for board in $boards; do run_tests "$board" -j "$jobs"; done
+run_tests host -L vcan
 
 echo "$total_passed passed, $total_failed failed, $total_skipped skipped"
 [ "$total_failed" -eq 0 ]
