@@ -68,6 +68,16 @@ constexpr auto reciprocal(S d) {
     }
 }
 
+/// The largest integer not above x, which must be within int.
+template <class S>
+constexpr int floor_to_int(S x) {
+    if constexpr (std::floating_point<S>) {
+        return static_cast<int>(std::floor(x));
+    } else {
+        return x.raw() >> S::fraction_bits;
+    }
+}
+
 template <class S>
 constexpr S absolute(S x) {
     return x < S(0) ? -x : x;

@@ -13,6 +13,7 @@
 
 #include "tracking/association.hpp"
 #include "tracking/associator.hpp"
+#include "tracking/clutter_map.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/imm_pdaf.hpp"
 #include "tracking/kalman.hpp"
@@ -74,7 +75,7 @@ struct TrackerConfig {
                resolution_range_m >= S(0) && resolution_rate_mps >= S(0) &&
                min_start_rate_mps < max_start_rate_mps && max_range_m > S(0) && fold_distance2 >= S(0) &&
                initial_existence > S(0) && initial_existence < S(1) && survival > S(0) && survival <= S(1) &&
-               delete_existence > S(0) && delete_existence < initial_existence &&
+               delete_existence > S(0) && delete_existence * 2 < initial_existence &&
                confirm_existence > initial_existence && confirm_existence < S(1) && confirm_hits >= 2 &&
                max_misses >= 1 && max_range_sigma_m >= S(1) && max_range_sigma_m <= S(20) &&
                merge_distance2 >= S(0) && merge_frames >= 1 && replace_margin_db >= S(0);
@@ -103,7 +104,10 @@ template <class S>
 class Tracker {
   public:
     explicit Tracker(const TrackerConfig<S>& config)
-        : config_(config), gate_(config.gate), model_(config.modes.model()) {}
+        : config_(config),
+          gate_(config.gate),
+          clutter_(config.gate.clutter_density, config.gate.rate_span_mps),
+          model_(config.modes.model()) {}
 
     /// One frame, one period after the last. Of more than kMaxMeasurements the first are used: give them
     /// strongest first.
@@ -119,6 +123,7 @@ class Tracker {
         count_ = 0;
         pending_count_ = 0;
         last_id_ = 0;
+        clutter_.reset();
     }
 
     /// Another configuration, which must be valid(); begins anew. In place: the object is too large for a
@@ -126,6 +131,7 @@ class Tracker {
     void configure(const TrackerConfig<S>& config) {
         config_ = config;
         gate_ = Gate<S>(config.gate);
+        clutter_ = ClutterMap<S>(config.gate.clutter_density, config.gate.rate_span_mps);
         model_ = config.modes.model();
         reset();
     }
@@ -175,6 +181,15 @@ class Tracker {
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
     bool best_start(const Pending& from, const Measurement<S>& to, S& distance2, Track<S>& track) const;
+    /// The configured prior, its odds lowered as clutter is denser than expected; not so low as to be
+    /// deleted.
+    [[nodiscard]] S existence_of_start(S log_excess) const {
+        const S odds =
+            config_.initial_existence * reciprocal(S(S(1) - config_.initial_existence)) * exp(-log_excess);
+        const S existence = odds * reciprocal(S(S(1) + odds));
+        const S least = config_.delete_existence * 2;
+        return existence > least ? existence : least;
+    }
     bool make_room_for_tentative(S snr_db, TrackerReport& report);
     bool make_room_for_confirmed(S snr_db, TrackerReport& report);
     void confirm(TrackerReport& report);
@@ -186,6 +201,8 @@ class Tracker {
 
     TrackerConfig<S> config_;
     Gate<S> gate_;
+    ClutterMap<S> clutter_;
+    std::array<S, kMaxMeasurements> log_excess_{};  // of the frame's measurements
     std::array<Track<S>, kMaxTracks> track_{};
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
     AssociatorWorkspace<S> work_{};
@@ -213,6 +230,9 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
         } else {
             ++report.invalid_measurements;
         }
+    }
+    for (std::size_t i = 0; i < measurements.size(); ++i) {
+        log_excess_[i] = (free & bit(i)) != 0 ? clutter_.log_excess(measurements[i].z) : S(0);
     }
     predict();
     free &= ~associate_and_update(true, measurements, free, report);
@@ -267,7 +287,7 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         const Track<S>& t = track_[i];
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
-        gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t));
+        gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t), log_excess_);
         report.gate_overflow += row.dropped;
         existence[rows] = t.existence;
         if (config_.associator == Associator::imm_pdaf)
@@ -416,7 +436,7 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         left &= ~bit(index);
         best.id = next_id();
         best.state = TrackState::tentative;
-        best.existence = config_.initial_existence;
+        best.existence = existence_of_start(log_excess_[index]);
         best.snr_db = m.snr_db;
         best.age = pending_[static_cast<std::size_t>(partner)].age;
         best.hits = 2;
@@ -429,17 +449,23 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
 }
 
 /// Pending from now on: the unclaimed measurements of this frame, and as far as there is room those of the
-/// last that still have no partner.
+/// last that still have no partner. Those given up were clutter.
 template <class S>
 void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
                           std::uint64_t used) {
+    clutter_.forget();
     const int room = kMaxMeasurements - std::popcount(unclaimed);
     int kept = 0;
-    for (int i = 0; i < pending_count_ && kept < room; ++i) {
+    for (int i = 0; i < pending_count_; ++i) {
         const auto from = static_cast<std::size_t>(i);
-        if ((used & bit(from)) != 0 || pending_[from].age >= kStartFrames) continue;
-        pending_[static_cast<std::size_t>(kept++)] = {pending_[from].measurement,
-                                                      static_cast<std::uint8_t>(pending_[from].age + 1)};
+        const Pending& p = pending_[from];
+        if ((used & bit(from)) != 0) continue;
+        if (p.age >= kStartFrames || kept >= room) {
+            clutter_.add(p.measurement.z);
+        } else {
+            pending_[static_cast<std::size_t>(kept++)] = {p.measurement,
+                                                          static_cast<std::uint8_t>(p.age + 1)};
+        }
     }
     for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
         pending_[static_cast<std::size_t>(kept++)] = {

@@ -1,0 +1,74 @@
+/// Where detections keep coming that are nobody's: echoes of the road at minus the car's own speed, of a
+/// fence, of another radar. A coarse map of their mean number a frame makes the tracker trust such places
+/// less.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "tracking/scalar.hpp"
+
+namespace tracking {
+
+template <class S>
+class ClutterMap {
+  public:
+    static constexpr int kBands = 8;   ///< of kBandM; what is farther counts in the last
+    static constexpr int kRates = 64;  ///< over the span of range rates
+    static constexpr int kBandM = 20;
+
+    /// `density`: of clutter expected everywhere, a frame per m (m/s). `rate_span_mps`: of the measured range
+    /// rates, -span/2 to span/2; 0: unambiguous, 64 m/s are mapped.
+    ClutterMap(S density, S rate_span_mps)
+        : span_(rate_span_mps > S(0) ? rate_span_mps : S(kRates)), per_rate_(S(kRates) * reciprocal(span_)) {
+        const S least = constant<S>(1, std::int64_t{1} << 22);
+        const S cell = S(kBandM) * reciprocal(per_rate_);
+        per_count_ = S(1) * reciprocal(S(cell * (density < least ? least : density)));
+    }
+
+    /// ln of the clutter density at z over the density expected everywhere, >= 0.
+    [[nodiscard]] S log_excess(const Vec2<S>& z) const {
+        const S count = mean_[cell(z)];
+        return count > S(0) ? ln(S(S(1) + count * per_count_)) : S(0);
+    }
+
+    /// A measurement turned out to be nobody's.
+    void add(const Vec2<S>& z) { mean_[cell(z)] += constant<S>(1, kMemory); }
+
+    /// Once a frame: forgets with a time constant of kMemory frames. One band a frame, so that it costs
+    /// kRates multiplications.
+    void forget() {
+        for (std::size_t i = 0; i < kRates; ++i) {
+            S& mean = mean_[static_cast<std::size_t>(band_) * kRates + i];
+            if (mean > S(0)) mean -= mean * constant<S>(kBands, kMemory);
+        }
+        band_ = (band_ + 1) % kBands;
+    }
+
+    void reset() {
+        mean_.fill(S(0));
+        band_ = 0;
+    }
+
+  private:
+    static constexpr int kMemory = 64;
+
+    [[nodiscard]] std::size_t cell(const Vec2<S>& z) const {
+        // Limited before the conversion: what is off the map, however far, counts at its edge.
+        const auto index = [](S v, int count) {
+            const S last(count - 1);
+            return static_cast<std::size_t>(floor_to_int(v < S(0) ? S(0) : (v > last ? last : v)));
+        };
+        return index(z[0] * constant<S>(1, kBandM), kBands) * kRates +
+               index((z[1] + span_ * constant<S>(1, 2)) * per_rate_, kRates);
+    }
+
+    S span_;
+    S per_rate_;
+    S per_count_;
+    std::array<S, std::size_t{kBands} * kRates> mean_{};
+    int band_ = 0;  // to be forgotten next
+};
+
+}  // namespace tracking
