@@ -55,7 +55,7 @@ std::string tracker_names() {
     std::string names;
     for (const auto name : tracking::kAssociatorNames)
         names += (names.empty() ? "" : ", ") + std::string(name);
-    return names;
+    return names + "; ijipda:L for iterative JIPDA of level L, 0 to " + std::to_string(tracking::kMaxLevel);
 }
 
 struct Arguments {
@@ -73,8 +73,9 @@ struct Arguments {
 
 void resolve(Arguments& a, bool frames_given) {
     sim::SimulationOptions& o = a.options;
-    if (const auto tracker = tracking::associator_named(a.tracker)) {
-        o.tracker = *tracker;
+    if (const auto choice = tracking::associator_chosen(a.tracker)) {
+        o.tracker = choice->associator;
+        o.tracker_level = choice->level;
     } else {
         throw sim::InputError("--tracker: no tracker named \"" + a.tracker + "\"; known: " + tracker_names());
     }

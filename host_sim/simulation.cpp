@@ -262,8 +262,9 @@ struct Simulation::Parts {
         source = std::make_unique<TappedSource>(input, total, writer.get());
 
         constexpr int kWidestConverter = 16;
-        const auto config = radar_config(
-            waveform, world ? world->scenario().front_end.adc_bits : kWidestConverter, o.tracker);
+        auto config = radar_config(waveform, world ? world->scenario().front_end.adc_bits : kWidestConverter,
+                                   o.tracker);
+        if (o.tracker_level) config.tracker.ijipda.level = *o.tracker_level;
         if (!config.valid())
             throw InputError("waveform: no valid configuration of the firmware follows from it");
         radar =

@@ -55,6 +55,8 @@ TEST(RadarSim, RefusesBadCommandLinesWithStatusOneAndAReason) {
     refuses("", "nothing to do: give --scenario");
     refuses("--scenario rush-hour", "no scenario named \"rush-hour\"; shipped: approach");
     refuses("--scenario empty --tracker best", "no tracker named \"best\"; known: nn, pda, ospda");
+    refuses("--scenario empty --tracker ijipda:32", "no tracker named \"ijipda:32\"");
+    refuses("--scenario empty --tracker pda:2", "no tracker named \"pda:2\"");
     refuses("--scenario empty --trackers pda", "--trackers");
     refuses("--scenario empty --frames 0", "--frames: must be at least 1, is 0");
     refuses("--scenario empty --frames -5", "--frames: must be at least 1, is -5");

@@ -57,6 +57,27 @@ TEST_GROUP(Simulation) {
     }
 };
 
+TEST(Simulation, EveryTrackerFollowsTheFourTargets) {
+    for (std::size_t i = 0; i < tracking::kAssociatorNames.size(); ++i) {
+        auto options = quiet("four-targets", 60);
+        options.tracker = static_cast<tracking::Associator>(i);
+        const auto r = simulate(options);
+        STRCMP_EQUAL(std::string(tracking::kAssociatorNames[i]).c_str(), r.tracker.c_str());
+        LONGS_EQUAL(4, r.metrics.confirmed_tracks);
+        LONGS_EQUAL(0, r.metrics.false_tracks);
+        LONGS_EQUAL(0, r.metrics.id_switches);
+        CHECK(r.metrics.range_rmse_m < 0.3);
+        CHECK(r.metrics.velocity_rmse_mps < 0.3);
+    }
+}
+
+TEST(Simulation, LevelOfIterativeJipdaIsTaken) {
+    auto options = quiet("four-targets", 20);
+    options.tracker = tracking::Associator::ijipda;
+    options.tracker_level = 0;
+    CHECK(simulate(options).metrics.confirmed_tracks == 4);
+}
+
 TEST(Simulation, TracksTheFourTargets) {
     const auto r = simulate(quiet("four-targets", 60));
     LONGS_EQUAL(60, r.frames);
