@@ -24,7 +24,7 @@ nlohmann::json read_json_file(const std::filesystem::path& path);
 struct Allowed {
     double min;
     double max;
-    std::string_view unit = "";
+    std::string_view unit = {};
 };
 
 class JsonFields {

@@ -351,7 +351,7 @@ struct Simulation::Parts {
 
     [[nodiscard]] CycleView view() const {
         const std::uint64_t frame = options.detections.empty() ? source->last() : done - 1;
-        const double middle_s = dsp::kChirps / 2 * static_cast<double>(waveform.chirp_interval_ns) * 1e-9;
+        const double middle_s = dsp::kChirps / 2.0 * static_cast<double>(waveform.chirp_interval_ns) * 1e-9;
         return {frame,  static_cast<double>(frame) * waveform.period_ms / 1000 + middle_s, ego, truth,
                 *radar, options.detections.empty() ? &radar->power_map() : nullptr};
     }

@@ -48,7 +48,7 @@ double World::frame_start_s(std::uint64_t index) const {
 
 double World::frame_middle_s(std::uint64_t index) const {
     return frame_start_s(index) +
-           static_cast<double>(dsp::kChirps / 2 * scenario_.waveform.chirp_interval_ns) * 1e-9;
+           dsp::kChirps / 2.0 * static_cast<double>(scenario_.waveform.chirp_interval_ns) * 1e-9;
 }
 
 std::uint64_t World::frames() const {
@@ -112,7 +112,7 @@ std::vector<TruthObject> World::truth_at(double time_s) const {
         const double cell =
             (r.range_m + coupling_s_ * r.range_rate_mps - offset_m(scenario_)) / range_cell_m_;
         t.detectable = !t.stationary && cell >= 1 && cell <= dsp::kRangeCells - 1 &&
-                       std::fabs(r.range_rate_mps) <= (dsp::kDopplerCells / 2 - 1) * rate_cell_mps_ &&
+                       std::fabs(r.range_rate_mps) <= (dsp::kDopplerCells / 2.0 - 1) * rate_cell_mps_ &&
                        t.snr_db >= kDetectableSnr_db;
     }
     return list;
@@ -123,13 +123,15 @@ void World::add_road(double speed_mps, Random& random, std::vector<Echo>& list) 
     const double step_m = range_cell_m_ / 2;
     const double area_db =
         road.gamma_db + db_from_power(road.height_m * step_m * road.beam_width_deg * std::numbers::pi / 180);
-    for (double range = road.nearest_m; range < offset_m(scenario_) + range_cell_m_ * dsp::kRangeCells;
-         range += step_m) {
+    const double farthest = offset_m(scenario_) + range_cell_m_ * dsp::kRangeCells;
+    double range = road.nearest_m;
+    while (range < farthest) {
         const double snr_db = integrated_snr_db(scenario_.front_end, area_db, range);
         if (snr_db < kFaintest_db) break;
         // The car moves by many wavelengths from frame to frame: a new speckle each time.
         const double power = random.exponential();
         list.push_back({range, -speed_mps, power_from_db(snr_db) * power, random.uniform()});
+        range += step_m;
     }
 }
 
