@@ -1,6 +1,7 @@
 #include "host_sim/simulation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -96,6 +97,9 @@ class TappedSource final : public hal::BeatSource {
     std::uint32_t last_ = 0;
 };
 
+/// As the acceptance filters of the boards.
+constexpr std::array<std::uint16_t, 2> kRadarHears{can::ego::kMessage.id, can::command::kMessage.id};
+
 /// Two ports on one bus: the radar's, and the car's.
 struct Bus {
     std::unique_ptr<hal::LoopbackBus> loopback;
@@ -110,7 +114,9 @@ struct Bus {
             radar = &loopback->add_port();
             car = &loopback->add_port();
         } else {
-            radar_socket = opened_or_throw("CAN interface " + name, hal::SocketCan::open(name));
+            radar_socket = opened_or_throw(
+                "CAN interface " + name,
+                hal::SocketCan::open(name, hal::kernel_socket_calls(), {.accept = kRadarHears}));
             car_socket = opened_or_throw("CAN interface " + name, hal::SocketCan::open(name));
             radar = radar_socket.get();
             car = car_socket.get();

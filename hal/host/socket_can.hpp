@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "hal/contract/can_port.hpp"
@@ -42,6 +43,10 @@ struct SocketCanConfig {
     /// Frames receive() passes over in one call because they are not ours to read. Bounds it on a flooded
     /// bus.
     int rejects_per_call = 1024;
+    /// Standard identifiers to receive, sorted out by the kernel as a controller's acceptance filters do;
+    /// empty: all. Must outlive the port. A radar that takes everything spends its look at the bus on other
+    /// nodes' frames.
+    std::span<const std::uint16_t> accept = {};
 
     constexpr bool valid() const {
         return waits_per_cycle >= 0 && waits_per_cycle < 100 && rejects_per_call >= 1;

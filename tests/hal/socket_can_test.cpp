@@ -12,6 +12,7 @@
 
 #include <linux/can.h>
 #include <linux/can/error.h>
+#include <linux/can/raw.h>
 #include <net/if.h>
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -48,6 +49,7 @@ class FakeKernel final : public hal::SocketCalls {
     int pending_error = 0;  ///< the next receive tells it, as a socket does after its interface went
     std::uint32_t overflow = 0;
     std::vector<can_frame> sent;
+    std::vector<can_filter> filters;  ///< of the socket opened last
     int open_sockets = 0;
     int polls = 0;
     int last_polled = -1;
@@ -69,7 +71,12 @@ class FakeKernel final : public hal::SocketCalls {
         ++open_sockets;
         return 7;
     }
-    int setsockopt(int, int, int, const void*, unsigned) override { return -ENOPROTOOPT; }
+    int setsockopt(int, int, int name, const void* value, unsigned size) override {
+        if (name != CAN_RAW_FILTER) return -ENOPROTOOPT;
+        const auto* filter = static_cast<const can_filter*>(value);
+        filters.assign(filter, filter + size / sizeof(can_filter));
+        return 0;
+    }
     int ioctl(int, unsigned long request, ifreq& argument) override {
         STRCMP_EQUAL("vcan0", argument.ifr_name);
         if (!exists) return -ENODEV;
@@ -344,6 +351,19 @@ TEST(SocketCan, FloodOfForeignFramesIsBounded) {
     CHECK(!port.value->receive(frame));
     LONGS_EQUAL(8, port.value->counters().rejected);
     LONGS_EQUAL(12, kernel.waiting.size());
+}
+
+TEST(SocketCan, TakesOnlyAcceptedIdentifiersAndAlsoAfterAReconnect) {
+    static constexpr std::array<std::uint16_t, 2> kAccept{0x431, 0x432};
+    const auto port = hal::SocketCan::open("vcan0", kernel, {.accept = kAccept});
+    LONGS_EQUAL(2, kernel.filters.size());
+    kernel.filters.clear();
+    kernel.pending_error = -ENETDOWN;
+    port.value->receive(frame);
+    port.value->begin_cycle();
+    LONGS_EQUAL(2, kernel.filters.size());
+    LONGS_EQUAL(0x432, kernel.filters[1].can_id);
+    LONGS_EQUAL(CAN_SFF_MASK | CAN_EFF_FLAG, kernel.filters[1].can_mask);
 }
 
 TEST(SocketCan, LostFramesAreCountedAcrossReconnects) {

@@ -110,8 +110,8 @@ class Process:
         return self.wait(10.0)
 
 
-def run(*command):
-    subprocess.run(command, check=True)
+def run(*command, may_fail=False):
+    subprocess.run(command, check=not may_fail, stdout=subprocess.DEVNULL)
 
 
 def add_interface(name):
