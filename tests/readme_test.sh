@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the commands of README.md as a reader would, from a scratch copy of the working directory's layout.
+# Runs the commands of README.md as a reader would, in the source folder.
 #   ```sh        run here
 #   ```sh vcan   needs vcan0: run by tests/vcan, only listed here
 #   ```console   needs a board on the bench: shown, not run
@@ -11,6 +11,7 @@ kind=${2:-sh}
 
 commands=$(awk -v fence="\`\`\`$kind" '$0 == fence {on = 1; next} /^```/ {on = 0} on' README.md)
 [ -n "$commands" ] || { echo "README.md has no \`\`\`$kind block" >&2; exit 1; }
+log=$(mktemp)
 count=0
 while IFS= read -r line; do
     [ -n "$line" ] || continue
@@ -19,12 +20,12 @@ while IFS= read -r line; do
     esac
     echo "\$ $line"
     # A command that fails, or that asks for input, is a defect of the README.
-    timeout 240 bash -c "$line" </dev/null >/tmp/readme_test.$$ 2>&1 || {
-        cat /tmp/readme_test.$$
+    timeout 240 bash -c "$line" </dev/null >"$log" 2>&1 || {
+        cat "$log"
         echo "README.md: this command failed: $line" >&2
         exit 1
     }
     count=$((count + 1))
 done <<<"$commands"
-rm -f /tmp/readme_test.$$
+rm -f "$log"
 echo "$count commands of README.md ran"
