@@ -5,6 +5,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <utility>
 #include <type_traits>
 
 #include "dsp/fixed_math.hpp"
@@ -60,7 +61,7 @@ class ScaledWeight {
     friend constexpr ScaledWeight operator+(ScaledWeight a, ScaledWeight b) {
         if (a.mantissa_ == 0) return b;
         if (b.mantissa_ == 0) return a;
-        if (a.exponent_ < b.exponent_) return b + a;
+        if (a.exponent_ < b.exponent_) std::swap(a, b);
         const int shift = a.exponent_ - b.exponent_;
         if (shift > 31) return a;
         return normalised(static_cast<std::uint64_t>(a.mantissa_) + (b.mantissa_ >> shift), a.exponent_);

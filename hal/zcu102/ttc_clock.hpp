@@ -11,14 +11,16 @@ namespace hal::zcu102 {
 
 struct TtcConfig {
     std::uint32_t reference_hz = kReferenceHz;  ///< LPD_LSBUS_CLK
-    /// The reference clock is divided by 2^prescaler_log2. 8: a count is 2.56 us, far below what a period
-    /// needs, and a counter of 16 bits, as the emulator has, turns over in 126 ms, which is longer than a
-    /// period; the board's 32 bits last three hours. (The emulator with -icount also needs a prescaler:
-    /// without one it can hang.)
-    std::uint32_t prescaler_log2 = 8;
+    /// The reference clock is divided by 2^prescaler_log2. 4: a count is 0.16 us and the board's 32 bits turn over in
+    /// 11 minutes.
+    std::uint32_t prescaler_log2 = 4;
+    /// Of a counter with 16 bits, as the emulator's. 12: a count is 31 us, and a turn 2 s, longer than a busy PC lets an
+    /// emulated processor wait. (With -icount the emulator needs a prescaler: without one it can hang.)
+    std::uint32_t narrow_prescaler_log2 = 12;
 
     [[nodiscard]] constexpr bool valid() const {
-        return reference_hz >= 1'000'000 && prescaler_log2 >= 1 && prescaler_log2 <= 16;
+        return reference_hz >= 1'000'000 && prescaler_log2 >= 1 && prescaler_log2 <= 16 &&
+               narrow_prescaler_log2 >= 1 && narrow_prescaler_log2 <= 16;
     }
 };
 static_assert(TtcConfig{}.valid());
@@ -42,9 +44,10 @@ class TtcClock final : public Clock {
     void start() {
         using namespace ttc_reg;
         registers_.write(kInterruptEnable, 0);
-        registers_.write(kClockControl, kClockPsEn | (config_.prescaler_log2 - 1) << kClockPsValShift);
         registers_.write(kIntervalCounter, 0xFFFF'FFFF);
         mask_ = registers_.read(kIntervalCounter);
+        shift_ = mask_ == 0xFFFF ? config_.narrow_prescaler_log2 : config_.prescaler_log2;
+        registers_.write(kClockControl, kClockPsEn | (shift_ - 1) << kClockPsValShift);
         registers_.write(kCounterControl, kCounterInt | kCounterRst | kCounterWaveDisable);
         last_ = registers_.read(kCounterValue) & mask_;
         count_ = 0;
@@ -54,9 +57,9 @@ class TtcClock final : public Clock {
         const std::uint32_t value = registers_.read(ttc_reg::kCounterValue) & mask_;
         count_ += (value - last_) & mask_;
         last_ = value;
-        // counts * 2^prescaler / reference_hz, in an order that cannot overflow before the year 5000.
-        const std::uint64_t whole_s = (count_ << config_.prescaler_log2) / config_.reference_hz;
-        const std::uint64_t rest = (count_ << config_.prescaler_log2) % config_.reference_hz;
+        // counts * 2^prescaler / reference_hz, in an order that cannot overflow in 5000 years.
+        const std::uint64_t whole_s = (count_ << shift_) / config_.reference_hz;
+        const std::uint64_t rest = (count_ << shift_) % config_.reference_hz;
         return whole_s * 1'000'000 + rest * 1'000'000 / config_.reference_hz;
     }
 
@@ -69,6 +72,7 @@ class TtcClock final : public Clock {
     Registers registers_;
     TtcConfig config_;
     std::uint32_t mask_ = 0xFFFF;
+    std::uint32_t shift_ = 1;  ///< prescaler in use, log2
     std::uint32_t last_ = 0;
     std::uint64_t count_ = 0;
 };
