@@ -175,4 +175,10 @@ AssociationStatus associate(std::span<AssociationRow<S>> rows, const Association
     return status;
 }
 
+/// The one the firmware uses is compiled once, in associator.cpp.
+extern template AssociationStatus associate(std::span<AssociationRow<dsp::Real>>,
+                                            const AssociationInput<dsp::Real>&, Associator,
+                                            const OrderStatisticsConfig<dsp::Real>&, const IjipdaConfig&,
+                                            AssociatorWorkspace<dsp::Real>&);
+
 }  // namespace tracking
