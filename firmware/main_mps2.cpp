@@ -18,8 +18,7 @@ namespace {
 using hal::Mmio;
 using namespace hal::mps2;
 
-constexpr firmware::RadarConfig kConfig{};
-static_assert(kConfig.valid());
+constexpr firmware::RadarConfig kConfig = firmware::radar_config(dsp::kDefaultWaveform);
 
 constexpr std::uint32_t kSlcanBaud = 1'000'000;
 

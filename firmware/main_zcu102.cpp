@@ -17,8 +17,7 @@ namespace {
 using hal::Mmio;
 using namespace hal::zcu102;
 
-constexpr firmware::RadarConfig kConfig{};
-static_assert(kConfig.valid());
+constexpr firmware::RadarConfig kConfig = firmware::radar_config(dsp::kDefaultWaveform);
 
 using Timer = TtcClock<Mmio<kTtc0>>;
 

@@ -149,18 +149,8 @@ void check(const SimulationOptions& o) {
 
 firmware::RadarConfig radar_config(const dsp::Waveform& waveform, int adc_bits,
                                    tracking::Associator tracker) {
-    firmware::RadarConfig config;
-    config.waveform = waveform;
-    config.dsp.adc_full_scale = static_cast<std::int16_t>((1 << (adc_bits - 1)) - 1);
-    const dsp::CellScale cell = waveform.scale();
+    firmware::RadarConfig config = firmware::radar_config(waveform, adc_bits);
     config.tracker.associator = tracker;
-    config.tracker.motion.period_s = Real::ratio(waveform.period_ms, 1000);
-    config.tracker.modes.period_s = config.tracker.motion.period_s;
-    config.tracker.gate.rate_span_mps = cell.rate_cell_mps * dsp::kDopplerCells;
-    config.tracker.gate.alias_range_m = cell.coupling_s * config.tracker.gate.rate_span_mps;
-    config.tracker.resolution_range_m = cell.range_cell_m * 2;
-    config.tracker.resolution_rate_mps = cell.rate_cell_mps * 2;
-    config.tracker.max_range_m = cell.range_offset_m + cell.range_cell_m * (dsp::kRangeCells + 2);
     return config;
 }
 

@@ -35,12 +35,14 @@ class Emulator:
     serve: {name: path} of serial lines that another program connects to at that path, in place of `serial`.
     can_interface: SocketCAN interface to join the emulated bus to (zcu102 only).
     icount: one instruction takes 2**icount ns of virtual time; None lets virtual time follow the wall clock.
+    directory: where the image's semihosting finds and leaves files.
     warp: with icount, virtual time jumps while the processor sleeps instead of waiting for the wall clock.
     """
 
     def __init__(self, board, image, can_interface=None, icount=None, warp=False, serve=None,
-                 extra=()):
+                 directory=None, extra=()):
         self.board = board
+        self.working_directory = directory
         self.directory = tempfile.mkdtemp(prefix="radar_emulator_")
         self.serial = {}
         self.process = None
@@ -53,6 +55,7 @@ class Emulator:
     def _start(self, image, can_interface, icount, warp, serve, extra):
         if not os.path.exists(image):
             raise FileNotFoundError(f"no image {image}: build it with cmake --build --preset <board>")
+        image = os.path.abspath(image)
         listeners = {}
         serial_options = []
         for name in SERIAL_LINES[self.board]:
@@ -86,7 +89,8 @@ class Emulator:
         environment = dict(os.environ, QEMU_AUDIO_DRV="none")
         self.messages = open(os.path.join(self.directory, "messages"), "w+")
         self.process = subprocess.Popen(command + common + serial_options + extra, stdin=subprocess.DEVNULL,
-                                        stderr=self.messages, env=environment)
+                                        stderr=self.messages, env=environment,
+                                        cwd=self.working_directory)
         for name, listener in listeners.items():
             self.serial[name] = self._accept(listener)
         if self.board == "zcu102":

@@ -116,7 +116,8 @@ File received = open_or_exit("bus.bin", 7, File::Mode::read);
 RecordedBeat beat(frames);
 
 const hal::Board board{beat, measured_port, timer, watchdog, console};
-firmware::Radar radar(firmware::RadarConfig{}, board);
+constexpr firmware::RadarConfig kConfig = firmware::radar_config(dsp::kDefaultWaveform);
+firmware::Radar radar(kConfig, board);
 
 void feed_bus() {
     std::uint32_t count = 0;
