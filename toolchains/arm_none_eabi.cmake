@@ -12,6 +12,11 @@ set(CMAKE_EXECUTABLE_SUFFIX_CXX .elf)
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 
+# The data association methods of an image are those of tracking::Associator up to this one. Up to ospda, an image is
+# within 96 KiB ROM and 64 KiB static RAM; imm_pdaf is all of them.
+set(RADAR_LAST_ASSOCIATOR ospda CACHE STRING "nn, pda, ospda, jpda, osjpda, ipda, ... imm_pdaf")
+add_compile_definitions(RADAR_LAST_ASSOCIATOR=${RADAR_LAST_ASSOCIATOR})
+
 # No floating-point unit may be used (-mfloat-abi=soft) and no helper for one is linked: toolchains/check_image.py looks.
 # EIGEN_NO_MALLOC turns a dynamic matrix into a compile error, NDEBUG and EIGEN_NO_DEBUG keep asserts (which print) out.
 string(JOIN " " CMAKE_CXX_FLAGS_INIT ${RADAR_CPU_FLAGS} -mfloat-abi=soft -ffunction-sections -fdata-sections -fno-exceptions

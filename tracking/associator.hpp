@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "tracking/association.hpp"
 #include "tracking/existence.hpp"
@@ -44,11 +45,21 @@ enum class Associator : std::uint8_t {
 inline constexpr std::array<std::string_view, 13> kAssociatorNames{
     "nn",    "pda",    "ospda", "jpda",   "osjpda",   "ipda",    "lm-ipda",
     "jipda", "ijipda", "ihpda", "jihpda", "lm-ihpda", "imm-pdaf"};
+
+/// The associators of this program are those up to kLastAssociator. A build for a small memory leaves out the
+/// ones behind it, their code and their scratch memory, by the macro.
+#ifdef RADAR_LAST_ASSOCIATOR
+inline constexpr Associator kLastAssociator = Associator::RADAR_LAST_ASSOCIATOR;
+#else
 inline constexpr auto kLastAssociator = static_cast<Associator>(kAssociatorNames.size() - 1);
+#endif
+inline constexpr bool kHasJoint = kLastAssociator >= Associator::jpda;
+inline constexpr bool kHasExistence = kLastAssociator >= Associator::ipda;
+inline constexpr bool kHasModes = kLastAssociator >= Associator::imm_pdaf;
 
 /// Needs signal strengths and RankInput.
 constexpr bool uses_rank(Associator a) {
-    return a == Associator::ihpda || a == Associator::jihpda || a == Associator::lm_ihpda;
+    return kHasExistence && (a == Associator::ihpda || a == Associator::jihpda || a == Associator::lm_ihpda);
 }
 
 constexpr std::string_view name_of(Associator a) {
@@ -85,10 +96,10 @@ constexpr std::optional<AssociatorChoice> associator_chosen(std::string_view tex
 }
 
 /// From log ratios to betas, weights and evidence of all rows, of the associators that need no existence.
-/// `work` is touched by jpda and osjpda only.
-template <class S>
+/// `work`, JpdaWorkspace<S>, is touched by jpda and osjpda only; without them it may be anything.
+template <class S, class Workspace>
 JpdaStatus associate(std::span<AssociationRow<S>> rows, Associator associator,
-                     const OrderStatisticsConfig<S>& order, JpdaWorkspace<S>& work) {
+                     const OrderStatisticsConfig<S>& order, Workspace& work) {
     JpdaStatus status;
     pda(rows);
     switch (associator) {
@@ -101,10 +112,10 @@ JpdaStatus associate(std::span<AssociationRow<S>> rows, Associator associator,
             order_statistics(rows, order);
             break;
         case Associator::jpda:
-            status = jpda(rows, work);
+            if constexpr (kHasJoint) status = jpda(rows, work);
             break;
         case Associator::osjpda:
-            status = jpda(rows, work);
+            if constexpr (kHasJoint) status = jpda(rows, work);
             order_statistics(rows, order);
             break;
         default:
@@ -124,9 +135,10 @@ struct AssociationInput {
 /// Scratch memory of associate(), sizeof(AssociatorWorkspace<dsp::Real>) = 34 KiB, static on the targets.
 template <class S>
 struct AssociatorWorkspace {
-    JpdaWorkspace<S> jpda;
-    IjipdaWorkspace<S> ijipda;
-    IhpdaWorkspace<S> ihpda;
+    struct None {};
+    std::conditional_t<kHasJoint, JpdaWorkspace<S>, None> jpda;
+    std::conditional_t<kHasExistence, IjipdaWorkspace<S>, None> ijipda;
+    std::conditional_t<kHasExistence, IhpdaWorkspace<S>, None> ihpda;
 };
 
 struct AssociationStatus {
@@ -134,12 +146,11 @@ struct AssociationStatus {
     int limited = 0;       ///< rows that did not reach the level of iterative JIPDA asked for
 };
 
-/// From log ratios to betas and weights of all rows, and their existence. Any associator; imm_pdaf is PDA
-/// here.
+/// Those of associate() that weigh by existence.
 template <class S>
-AssociationStatus associate(std::span<AssociationRow<S>> rows, const AssociationInput<S>& input,
-                            Associator associator, const OrderStatisticsConfig<S>& order,
-                            const IjipdaConfig& iterative, AssociatorWorkspace<S>& work) {
+AssociationStatus associate_by_existence(std::span<AssociationRow<S>> rows, const AssociationInput<S>& input,
+                                         Associator associator, const IjipdaConfig& iterative,
+                                         AssociatorWorkspace<S>& work) {
     AssociationStatus status;
     switch (associator) {
         case Associator::ipda:
@@ -168,10 +179,25 @@ AssociationStatus associate(std::span<AssociationRow<S>> rows, const Association
                   {.sharing = Sharing::greedy, .modulated = true}, work.ihpda);
             break;
         default:
-            status.approximated = associate(rows, associator, order, work.jpda).approximated;
-            for (std::size_t t = 0; t < rows.size(); ++t)
-                input.existence[t] = updated_existence(input.existence[t], rows[t].log_evidence);
+            break;
     }
+    return status;
+}
+
+/// From log ratios to betas and weights of all rows, and their existence. Any associator; imm_pdaf is PDA
+/// here.
+template <class S>
+AssociationStatus associate(std::span<AssociationRow<S>> rows, const AssociationInput<S>& input,
+                            Associator associator, const OrderStatisticsConfig<S>& order,
+                            const IjipdaConfig& iterative, AssociatorWorkspace<S>& work) {
+    if constexpr (kHasExistence) {
+        if (associator >= Associator::ipda)
+            return associate_by_existence(rows, input, associator, iterative, work);
+    }
+    AssociationStatus status;
+    status.approximated = associate(rows, associator, order, work.jpda).approximated;
+    for (std::size_t t = 0; t < rows.size(); ++t)
+        input.existence[t] = updated_existence(input.existence[t], rows[t].log_evidence);
     return status;
 }
 

@@ -139,7 +139,10 @@ class Tracker {
     /// From the next frame on; tracks are kept.
     void set_associator(Associator associator) {
         config_.associator = associator;
-        for (std::size_t i = 0; i < live().size(); ++i) modes_[i].start(track_[i].x, track_[i].covariance);
+        if constexpr (kHasModes) {
+            for (std::size_t i = 0; i < live().size(); ++i)
+                modes_[i].start(track_[i].x, track_[i].covariance);
+        }
     }
 
     [[nodiscard]] const TrackerConfig<S>& config() const { return config_; }
@@ -155,6 +158,7 @@ class Tracker {
 
     static constexpr std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
 
+    [[nodiscard]] bool by_modes() const { return kHasModes && config_.associator == Associator::imm_pdaf; }
     std::span<Track<S>> live() { return {track_.data(), static_cast<std::size_t>(count_)}; }
     [[nodiscard]] int count_of(bool confirmed) const {
         int n = 0;
@@ -207,7 +211,7 @@ class Tracker {
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
     AssociatorWorkspace<S> work_{};
     ImmModel<S, 2, 2> model_;
-    std::array<ImmState<S, 2, 2>, kMaxTracks> modes_{};  // of track_, in the same order
+    std::array<ImmState<S, 2, 2>, kHasModes ? kMaxTracks : 0> modes_{};  // of track_, in the same order
     std::array<Pending, kMaxMeasurements> pending_{};
     int count_ = 0;
     int pending_count_ = 0;
@@ -248,7 +252,7 @@ template <class S>
 void Tracker<S>::predict() {
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& t = track_[i];
-        if (config_.associator == Associator::imm_pdaf) {
+        if (by_modes()) {
             tracking::predict(modes_[i], model_);
             const Estimate<S, 2> all = combined(modes_[i]);
             t.x = all.x;
@@ -290,12 +294,11 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t), log_excess_);
         report.gate_overflow += row.dropped;
         existence[rows] = t.existence;
-        if (config_.associator == Associator::imm_pdaf)
-            associate_modes(modes_[i], t.x, row, existence[rows], measurements);
+        if (by_modes()) associate_modes(modes_[i], t.x, row, existence[rows], measurements);
         if (uses_rank(config_.associator)) rank[rows] = gate_.rank_input(row, t, measurements);
         ++rows;
     }
-    if (config_.associator != Associator::imm_pdaf) {
+    if (!by_modes()) {
         const AssociationStatus status = associate<S>(
             {row_.data(), rows},
             {{existence.data(), rows}, {strength.data(), measurements.size()}, {rank.data(), rows}},
@@ -341,7 +344,7 @@ void Tracker<S>::associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, Ass
 template <class S>
 void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
                         std::span<const Measurement<S>> measurements) {
-    if (config_.associator == Associator::imm_pdaf) {
+    if (by_modes()) {
         const Estimate<S, 2> all = combined(modes_[static_cast<std::size_t>(&track - track_.data())]);
         track.x = all.x;
         track.covariance = all.covariance;
@@ -441,7 +444,7 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         best.age = pending_[static_cast<std::size_t>(partner)].age;
         best.hits = 2;
         best.measured = true;
-        modes_[static_cast<std::size_t>(count_)].start(best.x, best.covariance);
+        if constexpr (kHasModes) modes_[static_cast<std::size_t>(count_)].start(best.x, best.covariance);
         track_[static_cast<std::size_t>(count_++)] = best;
         ++report.initiated;
     }
@@ -581,7 +584,7 @@ void Tracker<S>::erase_free() {
         if (track_[i].state == TrackState::free) continue;
         if (kept != i) {
             track_[kept] = track_[i];
-            modes_[kept] = modes_[i];
+            if constexpr (kHasModes) modes_[kept] = modes_[i];
         }
         ++kept;
     }

@@ -1,6 +1,7 @@
-// The firmware on an emulated board, fed with a recording: frames.bin (beat frames, see hal/host/frame_file_source.hpp) and
-// bus.bin (what the radar received from the bus in each cycle). Writes sent.bin (what it sent) and instructions.bin (what
-// each stage took). The CAN frames go through the board's real driver. scenario_test.py makes and compares these files.
+// The firmware on an emulated board, fed with a recording: frames.bin (beat frames, see
+// hal/host/frame_file_source.hpp) and bus.bin (what the radar received from the bus in each cycle). Writes
+// sent.bin (what it sent) and instructions.bin (what each stage took). The CAN frames go through the board's
+// real driver. scenario_test.py makes and compares these files.
 
 #include <array>
 #include <cstdint>

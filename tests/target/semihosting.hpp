@@ -1,4 +1,5 @@
-/// Files and exit of the PC, through the emulator. Only in test images: a board without a debugger stops at such a call.
+/// Files and exit of the PC, through the emulator. Only in test images: a board without a debugger stops at
+/// such a call.
 #pragma once
 
 #include <cstddef>

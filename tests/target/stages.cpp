@@ -25,7 +25,8 @@ extern "C" void enter_stage(std::uint32_t stage, std::uint32_t return_to) {
     visits[depth++].begin = instructions();
 }
 
-/// Adds what the stage took to it, and takes it from the stage around it. Returns where the wrapper returns to.
+/// Adds what the stage took to it, and takes it from the stage around it. Returns where the wrapper returns
+/// to.
 extern "C" std::uint32_t leave_stage() {
     const std::uint32_t now = instructions();
     const Visit& visit = visits[--depth];

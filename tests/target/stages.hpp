@@ -1,4 +1,5 @@
-/// Instructions by stage. The linker (--wrap) puts measuring functions around the firmware's own, which stay as they are.
+/// Instructions by stage. The linker (--wrap) puts measuring functions around the firmware's own, which stay
+/// as they are.
 #pragma once
 
 #include <array>
@@ -8,7 +9,7 @@
 namespace target {
 
 enum class Stage : std::uint8_t {
-    input_check,   ///< dead, stuck, clipped frames; noise level
+    input_check,  ///< dead, stuck, clipped frames; noise level
     dc_removal,
     range_fft,
     doppler_fft,
@@ -16,20 +17,23 @@ enum class Stage : std::uint8_t {
     cfar,          ///< local maxima and OS-CFAR
     peaks,
     association,
-    filter,        ///< prediction, gates, update, track life: tracker less association
+    filter,  ///< prediction, gates, update, track life: tracker less association
     warning,
-    can,           ///< from the first frame sent to the last: encoding, protection, driver
-    rest,          ///< receiving, health, glue
+    can,   ///< from the first frame sent to the last: encoding, protection, driver
+    rest,  ///< receiving, health, glue
     count_
 };
 inline constexpr std::size_t kStages = static_cast<std::size_t>(Stage::count_);
 inline constexpr std::array<std::string_view, kStages> kStageNames{
-    "input check", "dc removal", "range fft",   "doppler fft", "window and power", "cfar",
-    "peaks",       "association", "filter",     "warning",     "can",              "rest"};
+    "input check",      "dc removal", "range fft", "doppler fft",
+    "window and power", "cfar",       "peaks",     "association",
+    "filter",           "warning",    "can",       "rest"};
 
 /// Of one cycle.
 extern std::array<std::uint32_t, kStages> stage_instructions;
 
-inline std::uint32_t& instructions_of(Stage stage) { return stage_instructions[static_cast<std::size_t>(stage)]; }
+inline std::uint32_t& instructions_of(Stage stage) {
+    return stage_instructions[static_cast<std::size_t>(stage)];
+}
 
 }  // namespace target

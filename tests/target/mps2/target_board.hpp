@@ -103,6 +103,8 @@ class TestBus {
 };
 
 inline Uart<Mmio<kUart0>, 64> uart({});
-inline void start_uart() { uart.start(115'200); }
+inline void start_uart() {
+    uart.start(115'200);
+}
 
 }  // namespace target

@@ -1,5 +1,5 @@
-/// What the replay needs of a ZCU102: the real CAN driver on CAN1, and on CAN0, at the same emulated bus, the rest of the
-/// car.
+/// What the replay needs of a ZCU102: the real CAN driver on CAN1, and on CAN0, at the same emulated bus, the
+/// rest of the car.
 #pragma once
 
 #include <array>
@@ -93,6 +93,8 @@ class TestBus {
 };
 
 inline Uart<Mmio<kUart0>> uart({});
-inline void start_uart() { uart.start(baud_rate(kReferenceHz, 115'200)); }
+inline void start_uart() {
+    uart.start(baud_rate(kReferenceHz, 115'200));
+}
 
 }  // namespace target
