@@ -12,8 +12,10 @@ inline std::int32_t call(std::uint32_t operation, const void* argument) {
     register const void* r1 asm("r1") = argument;
 #if defined(__ARM_ARCH_PROFILE) && __ARM_ARCH_PROFILE == 'M'
     asm volatile("bkpt 0xAB" : "+r"(r0) : "r"(r1) : "memory");
-#else
+#elif defined(__thumb__)
     asm volatile("svc 0xAB" : "+r"(r0) : "r"(r1) : "memory", "lr");
+#else
+    asm volatile("svc 0x123456" : "+r"(r0) : "r"(r1) : "memory", "lr");
 #endif
     return static_cast<std::int32_t>(r0);
 }
