@@ -199,6 +199,7 @@ def main():
     parser.add_argument("image")
     parser.add_argument("--seconds", type=float, default=10, help="end after this time (default 10)")
     parser.add_argument("--icount", type=int, help="one instruction takes 2^ICOUNT ns of virtual time")
+    parser.add_argument("--warp", action="store_true", help="with --icount: skip the time the processor sleeps")
     parser.add_argument("--serve", metavar="LINE=PATH", action="append", default=[],
                         help="offer a serial line (console, beat, can) as a UNIX socket at PATH")
     parser.add_argument("--can", metavar="IFACE", help="join the emulated CAN bus to this interface (zcu102)")
@@ -210,6 +211,7 @@ def main():
 
     try:
         code, _ = run(arguments.board, arguments.image, arguments.seconds, show, icount=arguments.icount,
+                      warp=arguments.warp,
                       can_interface=arguments.can, serve=dict(line.split("=", 1) for line in arguments.serve))
     except (OSError, RuntimeError) as error:
         print(f"emulator.py: {error}", file=sys.stderr)

@@ -37,6 +37,7 @@ class BeatInput final : public BeatSource {
         do {
             receive();
             if (ring_.take(frame, sequence) == RingResult::taken) return BeatResult::ok;
+            timer_.pause();
         } while (timer_.now_us() < deadline_us);
         return broken() != broken_before ? BeatResult::invalid : BeatResult::missing;
     }

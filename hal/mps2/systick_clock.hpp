@@ -41,21 +41,17 @@ class SysTickClock final : public Clock {
 
     /// Sleeps; interrupts are served meanwhile.
     void wait_until(std::uint64_t time_us) override {
-        using namespace timer_reg;
         const std::uint64_t until = time_us * kTicksPerUs;
         for (std::uint64_t now = now_ticks(); now < until; now = now_ticks()) {
             const std::uint64_t rest = until - now;
             const auto sleep = static_cast<std::uint32_t>(rest < kLongestSleep ? rest : kLongestSleep);
             if (sleep < kShortestSleep) continue;
-            system_.hold_interrupts();  // an alarm before the sleep must end it, not be over by then
-            timer_.write(kReload, sleep);
-            timer_.write(kValue, sleep);
-            timer_.write(kCtrl, kCtrlEnable | kCtrlInterrupt);
-            system_.wait_for_interrupt();
-            timer_.write(kCtrl, 0);
-            system_.release_interrupts();
+            sleep_for(sleep);
         }
     }
+
+    /// Sleeps until any interrupt, for 0.1 ms at most.
+    void pause() { sleep_for(kClockHz / 10'000); }
 
     /// The timer's interrupt: it did its work by ending the sleep.
     void on_alarm() {
@@ -64,6 +60,17 @@ class SysTickClock final : public Clock {
     }
 
   private:
+    void sleep_for(std::uint32_t ticks) {
+        using namespace timer_reg;
+        system_.hold_interrupts();  // an alarm before the sleep must end it, not be over by then
+        timer_.write(kReload, ticks);
+        timer_.write(kValue, ticks);
+        timer_.write(kCtrl, kCtrlEnable | kCtrlInterrupt);
+        system_.wait_for_interrupt();
+        timer_.write(kCtrl, 0);
+        system_.release_interrupts();
+    }
+
     static constexpr std::uint32_t kMask = 0x00FF'FFFF;
     static constexpr std::uint32_t kTicksPerUs = kClockHz / 1'000'000;
     static constexpr std::uint32_t kLongestSleep =

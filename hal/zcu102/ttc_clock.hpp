@@ -11,11 +11,12 @@ namespace hal::zcu102 {
 
 struct TtcConfig {
     std::uint32_t reference_hz = kReferenceHz;  ///< LPD_LSBUS_CLK
-    /// The reference clock is divided by 2^prescaler_log2. 4: a count is 0.16 us and the board's 32 bits turn over in
-    /// 11 minutes.
+    /// The reference clock is divided by 2^prescaler_log2. 4: a count is 0.16 us and the board's 32 bits turn
+    /// over in 11 minutes.
     std::uint32_t prescaler_log2 = 4;
-    /// Of a counter with 16 bits, as the emulator's. 12: a count is 31 us, and a turn 2 s, longer than a busy PC lets an
-    /// emulated processor wait. (With -icount the emulator needs a prescaler: without one it can hang.)
+    /// Of a counter with 16 bits, as the emulator's. 12: a count is 31 us, and a turn 2 s, longer than a busy
+    /// PC lets an emulated processor wait. (With -icount the emulator needs a prescaler: without one it can
+    /// hang.)
     std::uint32_t narrow_prescaler_log2 = 12;
 
     [[nodiscard]] constexpr bool valid() const {
@@ -64,8 +65,14 @@ class TtcClock final : public Clock {
     }
 
     void wait_until(std::uint64_t time_us) override {
-        while (now_us() < time_us) {
-        }
+        while (now_us() < time_us) pause();
+    }
+
+    /// A few microseconds without a look at any device: polling at full speed takes the bus from others, and
+    /// an emulator that is kept busy with it does not get to move the bytes that are waited for. Less than a
+    /// byte at 1 Mbaud.
+    static void pause() {
+        for (int i = 0; i < 50; ++i) asm volatile(".rept 60\n nop\n .endr");
     }
 
   private:
