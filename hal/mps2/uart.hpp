@@ -44,10 +44,15 @@ class Uart {
     /// The next received byte, or -1.
     int read() {
         const int byte = queue_.get();
-        if (blocked_) {
+        // A byte that comes while the interrupt is off raises none when it is on again: look once more after that.
+        while (blocked_ && queue_.free() > 0) {
             blocked_ = false;
             on_receive();
-            if (!blocked_) registers_.write(uart_reg::kCtrl, kListening);
+            if (blocked_) break;
+            registers_.write(uart_reg::kCtrl, kListening);
+            if ((registers_.read(uart_reg::kState) & uart_reg::kStateRxFull) == 0) break;
+            registers_.write(uart_reg::kCtrl, kListening & ~uart_reg::kCtrlRxInterrupt);
+            blocked_ = true;
         }
         return byte;
     }

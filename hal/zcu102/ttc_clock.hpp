@@ -14,10 +14,10 @@ struct TtcConfig {
     /// The reference clock is divided by 2^prescaler_log2. 4: a count is 0.16 us and the board's 32 bits turn
     /// over in 11 minutes.
     std::uint32_t prescaler_log2 = 4;
-    /// Of a counter with 16 bits, as the emulator's. 12: a count is 31 us, and a turn 2 s, longer than a busy
-    /// PC lets an emulated processor wait. (With -icount the emulator needs a prescaler: without one it can
-    /// hang.)
-    std::uint32_t narrow_prescaler_log2 = 12;
+    /// Of a counter with 16 bits, as the emulator's. 15: a count is 0.25 ms, and a turn 16 s, longer than a busy PC lets an
+    /// emulated processor wait. With less than 14 the emulator's timer, under -icount, stops time for good at a turn: it
+    /// rounds what is left to 0 ns.
+    std::uint32_t narrow_prescaler_log2 = 15;
 
     [[nodiscard]] constexpr bool valid() const {
         return reference_hz >= 1'000'000 && prescaler_log2 >= 1 && prescaler_log2 <= 16 &&

@@ -78,7 +78,7 @@ TEST(Zcu102TtcClock, no_drift_over_an_hour) {
                 clock.wait_until(next_us);
                 ++frames;
                 const std::uint64_t elapsed_us = (device.clocks - start) * 1000 / (hz / 1000);
-                CHECK_TRUE(elapsed_us + 42 >= next_us && elapsed_us <= next_us + 97 * 2 + 42);
+                CHECK_TRUE(elapsed_us + 330 >= next_us && elapsed_us <= next_us + 97 * 2 + 330);
             }
             CHECK_EQUAL(36'000U, frames);
         }
@@ -87,13 +87,13 @@ TEST(Zcu102TtcClock, no_drift_over_an_hour) {
 
 TEST(Zcu102TtcClock, never_goes_back) {
     device.width_mask = 0xFFFF;
-    device.clocks_a_look = 268'400'000;  // just below a turn of 65536 x 4096 clocks
+    device.clocks_a_look = 2'147'000'000;  // just below a turn of 65536 x 32768 clocks
     hal::zcu102::TtcClock<RegistersOf<FakeTtc>> clock({&device}, {});
     clock.start();
     std::uint64_t last = clock.now_us();
     for (int i = 0; i < 1000; ++i) {
         const std::uint64_t now = clock.now_us();
-        CHECK_TRUE(now - last >= 2'683'950 && now - last <= 2'684'050);
+        CHECK_TRUE(now - last >= 21'469'600 && now - last <= 21'470'400);
         last = now;
     }
 }
