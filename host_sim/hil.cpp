@@ -388,7 +388,7 @@ class Session {
     std::unique_ptr<hal::SerialPort> serial_;
     std::unique_ptr<hal::SocketCan> car_port_;
     std::unique_ptr<Listener> listener_;
-    BoardTwin twin_{firmware::RadarConfig{}};
+    BoardTwin twin_{firmware::radar_config(dsp::kDefaultWaveform)};
     can::Transmitter car_;
     dsp::BeatFrame frame_{};
     hal::BeatPacket packet_{};
