@@ -41,7 +41,7 @@ build host-clang --target radar_sim dsp_detect_test
 
 echo "== format and lint"
 cmake --build --preset host --target format-check
-cmake --build --preset host --target tidy
+cmake --build --preset host --target tidy-target
 
 run_tests host -j "$jobs" -LE vcan
 run_tests host-clang -L bit-exact
