@@ -17,8 +17,6 @@ namespace {
 using tracking::constant;
 using Vec2d = tracking::Vec2<double>;
 
-constexpr std::int64_t kMicro = 1'000'000;
-
 template <class S>
 S scalar(double v) {
     if constexpr (std::floating_point<S>) {

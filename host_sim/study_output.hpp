@@ -20,12 +20,16 @@ struct StudyOptions {
     StudyRunOptions run;
 };
 
-/// printf into a string; at most 1023 characters.
+/// printf into a string, at most 1023 characters; without values the text as it is.
 template <class... Values>
 std::string print(const char* format, Values... values) {
-    std::array<char, 1024> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return text.data();
+    if constexpr (sizeof...(values) == 0) {
+        return format;
+    } else {
+        std::array<char, 1024> text{};
+        std::snprintf(text.data(), text.size(), format, values...);
+        return text.data();
+    }
 }
 
 /// Throws InputError when the file cannot be written.

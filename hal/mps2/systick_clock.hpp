@@ -41,17 +41,26 @@ class SysTickClock final : public Clock {
 
     /// Sleeps; interrupts are served meanwhile.
     void wait_until(std::uint64_t time_us) override {
+        using namespace timer_reg;
         const std::uint64_t until = time_us * kTicksPerUs;
         for (std::uint64_t now = now_ticks(); now < until; now = now_ticks()) {
             const std::uint64_t rest = until - now;
             const auto sleep = static_cast<std::uint32_t>(rest < kLongestSleep ? rest : kLongestSleep);
             if (sleep < kShortestSleep) continue;
-            sleep_for(sleep);
+            system_.hold_interrupts();  // an alarm before the sleep must end it, not be over by then
+            timer_.write(kReload, sleep);
+            timer_.write(kValue, sleep);
+            timer_.write(kCtrl, kCtrlEnable | kCtrlInterrupt);
+            system_.wait_for_interrupt();
+            timer_.write(kCtrl, 0);
+            system_.release_interrupts();
         }
     }
 
-    /// Sleeps until any interrupt, for 0.1 ms at most.
-    void pause() { sleep_for(kClockHz / 10'000); }
+    /// Some 10 us without a look at any device, so that polling does not take the bus from others.
+    static void pause() {
+        for (int i = 0; i < 10; ++i) asm volatile(".rept 25\n nop\n .endr");
+    }
 
     /// The timer's interrupt: it did its work by ending the sleep.
     void on_alarm() {
@@ -60,17 +69,6 @@ class SysTickClock final : public Clock {
     }
 
   private:
-    void sleep_for(std::uint32_t ticks) {
-        using namespace timer_reg;
-        system_.hold_interrupts();  // an alarm before the sleep must end it, not be over by then
-        timer_.write(kReload, ticks);
-        timer_.write(kValue, ticks);
-        timer_.write(kCtrl, kCtrlEnable | kCtrlInterrupt);
-        system_.wait_for_interrupt();
-        timer_.write(kCtrl, 0);
-        system_.release_interrupts();
-    }
-
     static constexpr std::uint32_t kMask = 0x00FF'FFFF;
     static constexpr std::uint32_t kTicksPerUs = kClockHz / 1'000'000;
     static constexpr std::uint32_t kLongestSleep =
