@@ -39,7 +39,8 @@ RingResult FrameRing::take(dsp::BeatFrame& frame, std::uint32_t& sequence) {
     }
     if (stamp == 0) return RingResult::none;
 
-    std::memcpy(&frame, &memory_[from].frame, sizeof frame);
+    // memmove: the destination may lie in the ring itself.
+    std::memmove(&frame, &memory_[from].frame, sizeof frame);
     std::atomic_thread_fence(std::memory_order_acquire);
     if (load(memory_[from].opened) != stamp || load(memory_[from].closed) != stamp) {
         ++counters_.torn;
