@@ -21,7 +21,7 @@ struct HealthConfig {
     int ego_stale_cycles = 5;                 ///< without a valid EgoMotion
     int blocked_speed_mmps = 5000;            ///< above this a radar that sees must see something
     int blocked_cycles = 50;                  ///< this long
-    int sight_worth_cycles = 10;               ///< one sight outweighs so many cycles without
+    int sight_worth_cycles = 10;              ///< one sight outweighs so many cycles without
     int blocked_snr_cdb = 1500;               ///< echoes below this may be noise: 1 frame in 100 has one
     int interference_octaves_q10 = 2 * 1024;  ///< noise power over its running level: 2 octaves, 6 dB
     int start_cycles = 3;  ///< mode `starting` until the two-point start could have confirmed a track

@@ -33,8 +33,8 @@ struct RadarConfig {
     }
 };
 
-/// What follows from the waveform and the converter, everything else at its default: the one configuration of a waveform,
-/// on boards and on a PC alike.
+/// What follows from the waveform and the converter, everything else at its default: the one configuration of
+/// a waveform, on boards and on a PC alike.
 constexpr RadarConfig radar_config(const dsp::Waveform& waveform, int adc_bits = 12) {
     RadarConfig config;
     config.waveform = waveform;

@@ -36,9 +36,9 @@ struct SimulationOptions {
     std::optional<std::uint64_t> frames;  ///< stop after so many; >= 1
     tracking::Associator tracker = tracking::Associator::ospda;
     std::optional<int> tracker_level;  ///< of iterative JIPDA; the radar's own if not given
-    std::string bus = kLoopback;   ///< or a SocketCAN interface
-    std::filesystem::path log;     ///< candump -L of all that the radar sends and hears
-    std::filesystem::path record;  ///< beat frames as the radar took them
+    std::string bus = kLoopback;       ///< or a SocketCAN interface
+    std::filesystem::path log;         ///< candump -L of all that the radar sends and hears
+    std::filesystem::path record;      ///< beat frames as the radar took them
     /// Seconds simulated in one second; 0: as fast as possible, on a virtual clock.
     double speed = 0;
     bool quiet = false;  ///< no console lines of the firmware

@@ -44,7 +44,8 @@ class Uart {
     /// The next received byte, or -1.
     int read() {
         const int byte = queue_.get();
-        // A byte that comes while the interrupt is off raises none when it is on again: look once more after that.
+        // A byte that comes while the interrupt is off raises none when it is on again: look once more after
+        // that.
         while (blocked_ && queue_.free() > 0) {
             blocked_ = false;
             on_receive();

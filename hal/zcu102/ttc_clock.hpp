@@ -14,9 +14,9 @@ struct TtcConfig {
     /// The reference clock is divided by 2^prescaler_log2. 4: a count is 0.16 us and the board's 32 bits turn
     /// over in 11 minutes.
     std::uint32_t prescaler_log2 = 4;
-    /// Of a counter with 16 bits, as the emulator's. 15: a count is 0.25 ms, and a turn 16 s, longer than a busy PC lets an
-    /// emulated processor wait. With less than 14 the emulator's timer, under -icount, stops time for good at a turn: it
-    /// rounds what is left to 0 ns.
+    /// Of a counter with 16 bits, as the emulator's. 15: a count is 0.25 ms, and a turn 16 s, longer than a
+    /// busy PC lets an emulated processor wait. With less than 14 the emulator's timer, under -icount, stops
+    /// time for good at a turn: it rounds what is left to 0 ns.
     std::uint32_t narrow_prescaler_log2 = 15;
 
     [[nodiscard]] constexpr bool valid() const {

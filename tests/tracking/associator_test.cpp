@@ -1,5 +1,6 @@
-// Degenerate input for NN, PDA, JPDA and their order statistics, in both scalars, through the gate as the tracker does it. What is
-// expected is what any sound association must give; the few numbers are worked beside the test.
+// Degenerate input for NN, PDA, JPDA and their order statistics, in both scalars, through the gate as the
+// tracker does it. What is expected is what any sound association must give; the few numbers are worked
+// beside the test.
 #include <array>
 #include <cmath>
 #include <cstdint>
