@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds every configuration for PC and boards, checks format and lint, runs every test.
+# Installs what is missing, builds every configuration for PC and boards, checks the format, runs every test.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . toolchains/packages.sh
@@ -39,9 +39,8 @@ for board in $boards; do build "$board"; done
 build host-debug
 build host-clang --target radar_sim dsp_detect_test
 
-echo "== format and lint"
+echo "== format"
 cmake --build --preset host --target format-check
-cmake --build --preset host --target tidy-target
 
 run_tests host -j "$jobs" -LE vcan
 run_tests host-clang -L bit-exact
