@@ -7,7 +7,8 @@
     toolchains/target_report.py --check --board zcu102    compare with tests/target/budget.json
 
 Figures come from
-  - the images kernels and association (tests/target/), run each time: a few seconds a board;
+  - the images kernels and association (tests/target/), run each time: a few seconds a board; and peers, which is there
+    after toolchains/peers.sh and a new configure;
   - the scenarios, replayed by ctest on each board: build/<preset>/tests/target/<scenario>.json. One that is missing or
     older than the image is replayed now, half a minute each;
   - the linker's map of the image that is flashed;
@@ -159,9 +160,10 @@ def measure(board, kernels=None, only_kernels=False):
             raise Failure(f"no {path}: cmake --preset {board.preset} && cmake --build --preset {board.preset}")
     measured = run_image(board, kernels or board.tests / "kernels.elf")
     figures = dict(measured["bench"])
-    association = board.tests / "association.elf"
-    if association.exists() and not only_kernels:
-        figures.update(run_image(board, association)["bench"])
+    for image in ("association", "peers"):
+        path = board.tests / f"{image}.elf"
+        if path.exists() and not only_kernels:
+            figures.update(run_image(board, path)["bench"])
     figures["chirp"] = round(figures["range_transform"] / CHIRPS, 1)
     for frame in ("noise", "four", "crowded", "adversarial"):
         figures[f"cfar.{frame}.cell"] = round(figures[f"cfar.{frame}"] / MAP_CELLS, 2)
@@ -194,34 +196,36 @@ def measure(board, kernels=None, only_kernels=False):
 
 # --- precision and speed on the PC ---
 
-# Row of the table, subcommand of radar_bench, start of its row, bar, aim, unit.
-HOST_ROWS = [
-    ("SQNR, FFT, full scale", "accuracy", "FFT SQNR, full scale", 70, 75, "dB"),
-    ("SQNR, FFT, -40 dBFS", "accuracy", "FFT SQNR, -40 dBFS", 65, 70, "dB"),
-    ("noise floor added by the map, mean", "accuracy", "noise floor added", 0.5, 0.1, "dB"),
-    ("noise floor added, strongest row", "accuracy", "  in the row of the tone", 2.5, 0.5, "dB"),
-    ("PC, firmware loop alone, one core", "speed", "firmware loop", 20000, None, "frames/s"),
+# Row of the table, start of its row of `radar_bench accuracy`, bar, aim. Decibels, and the higher the better in the first.
+PRECISION = [
+    ("SQNR, FFT, full scale, dB", "64-point FFT, int16, full-scale", 70, 75, True),
+    ("SQNR, FFT, -40 dBFS, dB", "  the same at -40 dBFS", 65, 70, True),
+    ("noise floor added by the map, mean, dB", "noise floor of the map", 0.5, 0.1, False),
+    ("noise floor added, strongest row, dB", "  in the row of the tone", 2.5, 0.5, False),
 ]
+LEAST_FRAMES_PER_SECOND = 20_000
 
 
-def host_figures():
-    """Text of a HOST_ROWS row -> figure; empty where radar_bench is not built."""
+def run_bench(*options):
+    """The JSON that radar_bench writes; empty where it is not built."""
     radar_bench = ROOT / "build" / "host" / "tests" / "bench" / "radar_bench"
-    found = {}
     if not radar_bench.exists():
-        return found
-    for command, options in (("accuracy", ["--only", "dsp"]), ("speed", ["--quick", "--only", "firmware"])):
-        progress(f"PC: radar_bench {command}")
-        with tempfile.TemporaryDirectory() as directory:
-            path = pathlib.Path(directory) / "rows.json"
-            subprocess.run([radar_bench, command, *options, "--json", path], stdout=subprocess.DEVNULL,
-                           stderr=subprocess.DEVNULL)
-            rows = json.loads(path.read_text()) if path.exists() else []
-        for what, of, start, *_ in HOST_ROWS:
-            for row in rows:
-                if of == command and row["what"].startswith(start):
-                    found[what] = row["measured"]
-    return found
+        return []
+    progress(f"PC: radar_bench {' '.join(options)}")
+    with tempfile.TemporaryDirectory() as directory:
+        path = pathlib.Path(directory) / "rows.json"
+        subprocess.run([radar_bench, *options, "--json", path], stdout=subprocess.DEVNULL)
+        return json.loads(path.read_text()) if path.exists() else []
+
+
+def host_rows():
+    """[(what, bar, aim, measured, higher is better)]: what is measured on the PC."""
+    precision = run_bench("accuracy", "--only", "dsp")
+    rows = [(what, bar, aim, next((r["measured"] for r in precision if r["what"].startswith(start)), None), at_least)
+            for what, start, bar, aim, at_least in PRECISION]
+    loops = [(f"PC, {t['task']}, frames a second", LEAST_FRAMES_PER_SECOND, None, 1e9 / t["nanoseconds"], True)
+             for t in run_bench("speed", "--quick", "--only", "firmware")]
+    return rows + loops
 
 
 # --- the budget ---
@@ -296,12 +300,11 @@ def print_bars(budget, results, host):
             continue
         cells = [number(v) + mark(v, bar, aim) for v in (r["figures"].get(entry["figure"]) for r in results.values())]
         rows.append([f"{entry['what']}, {entry['unit']}", number(bar), number(aim), *cells])
-    for what, _, _, bar, aim, unit in HOST_ROWS:
-        value, at_least = host.get(what), unit == "frames/s" or what.startswith("SQNR")
-        text = ("-" if value is None else f"{value:,.3g}" if value < 1000 else f"{value:,.0f}") + mark(value, bar, aim, at_least)
+    for what, bar, aim, value, at_least in host:
+        text = "-" if value is None else f"{value:,.3g}" if value < 1000 else f"{value:,.0f}"
         sign = ">= " if at_least else ""
-        rows.append([f"{what}, {unit}", f"{sign}{bar:,g}", "-" if aim is None else f"{sign}{aim:,g}", text,
-                     *["=" if unit == "dB" else ""] * (len(results) - 1)])
+        rows.append([what, f"{sign}{bar:,g}", "-" if aim is None else f"{sign}{aim:,g}",
+                     text + mark(value, bar, aim, at_least), *["=" if "dB" in what else ""] * (len(results) - 1)])
     table("Bars and aims", ["what", "bar", "aim", *[BOARDS[b].core for b in results]], rows,
           ["+ aim reached, ! bar missed. Precision is measured on the PC; the boards compute the same bits (=)."])
 
@@ -324,7 +327,7 @@ def print_stages(result):
 
 
 def print_kernels(results):
-    names = [n for n in next(iter(results.values()))["figures"] if not n.startswith(("step.", "growth.", "cluster.", "tracker."))
+    names = [n for n in next(iter(results.values()))["figures"] if not n.startswith(("step.", "growth.", "cluster.", "tracker.", "peer."))
              and n not in ("rom", "ram", "stack", "chirp", "frame.mean", "loop.mean", "loop.worst") and not n.endswith(".cell")]
     rows = [[n, *[number(r["figures"].get(n)) for r in results.values()]] for n in names]
     table("Kernels, instructions", ["kernel", *[BOARDS[b].core for b in results]], rows,
@@ -333,20 +336,21 @@ def print_kernels(results):
 
 
 def print_filters(results):
-    """The tracker with each filter: 4 tracks, 7 detections."""
-    names = [n for n in next(iter(results.values()))["figures"] if re.fullmatch(r"step\.4x7\.[^.]+", n)]
-    if not names:
-        print("\nTracker step by filter: no image association, not measured")
-        return
+    """The tracker with each filter."""
+    figures = {BOARDS[b].core: r["figures"] for b, r in results.items()}
+    tasks = [("Tracker step by filter: 4 tracks, 7 detections, every one in every gate", r"step\.4x7\.([^.]+)"),
+             ("Whole tracker by filter: 16 tracks, 64 detections, worst frame", r"tracker\.worst\.([^.]+)")]
     columns = [(b, mhz) for b in results for mhz in BOARDS[b].clocks_mhz]
-    rows = []
-    for name in names:
-        values = {b: r["figures"].get(name) for b, r in results.items()}
-        rows.append([name.split(".")[-1], *[number(v) for v in values.values()],
-                     *[number(values[b] / mhz) if values[b] else "-" for b, mhz in columns]])
-    table("Tracker step, 4 tracks x 7 detections, by filter",
-          ["filter", *[BOARDS[b].core for b in results], *[f"us, {BOARDS[b].core.split('-')[1]} {mhz} MHz" for b, mhz in columns]],
-          rows, ["Instructions; microseconds at one instruction a clock."])
+    for title, pattern in tasks:
+        rows = []
+        for name in next(iter(figures.values())):
+            match = re.fullmatch(pattern, name)
+            if match:
+                rows.append([match.group(1), *[number(f.get(name)) for f in figures.values()],
+                             *[number(results[b]["figures"][name] / mhz) for b, mhz in columns]])
+        if rows:
+            table(title, ["filter", *figures, *[f"us, {BOARDS[b].core.split('-')[1]} {mhz} MHz" for b, mhz in columns]],
+                  rows, ["Instructions; microseconds at one instruction a clock."])
 
 
 def print_memory(results):
@@ -367,10 +371,12 @@ def print_elsewhere(results):
         ours = m7["figures"].get(figure)
         rows.append([f"{what}: ours", number(ours), "1", ""])
         for name, value, note in peers:
+            if f"peer.{name}" in m7["figures"]:
+                value, note = m7["figures"][f"peer.{name}"], f"{note}; measured now"
             rows.append([f"  {name}", number(value), f"{value / ours:.2f}" if ours else "-", note])
     table(f"Beside others, instructions on a {BOARDS[m7['board']].core}", ["what", "instructions", "of ours", ""], rows,
-          ["The others were measured elsewhere, with gcc 12.2 under the same emulator, not by this command; OS-CFAR there: "
-           "N = 16, k = 12 and", "all 2,048 cells. Ours: N = 20, k = 12, local maxima included."])
+          ["Unless it says so, the others were measured elsewhere, with gcc 12.2 under the same emulator, not by this command; "
+           "OS-CFAR", "there: N = 16, k = 12 and all 2,048 cells. Ours: N = 20, k = 12, local maxima included."])
 
 
 def growth_panels(figures):
@@ -457,7 +463,7 @@ def main():
             if not over and not missing:
                 print(f"{', '.join(results)}: {sum(1 for e in budget if e.get('limit'))} figures within the budget")
             return 2 if over else 1 if missing else 0
-        print_bars(budget, results, host_figures())
+        print_bars(budget, results, host_rows())
         for result in results.values():
             print_stages(result)
         print_kernels(results)
