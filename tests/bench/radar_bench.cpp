@@ -79,7 +79,9 @@ Measured speed(bool quick, const std::string& only, const std::string& json) {
 int main(int argc, char** argv) {
     CLI::App app{"Measures the radar, each figure beside its bar."};
     app.require_subcommand(1);
-    app.footer("exit code: 0 every bar met; 1 wrong usage, a file that cannot be read or written, or a competitor that "
+    app.footer(
+        "exit code: 0 every bar met; 1 wrong usage, a file that cannot be read or written, or a competitor "
+        "that "
         "computes something else; 2 a bar missed");
     std::string json;
     CLI::App* accuracy_command = app.add_subcommand(
