@@ -43,11 +43,14 @@ void calibrate_stages() {
     constexpr std::uint32_t kCalls = 4000;
     added_inside = added_outside = 0;
     stage_instructions = {};
+    visits[0] = {};  // nearly all visits are inside another stage's
+    depth = 1;
     const std::uint32_t both = calls(wrapped_nothing, kCalls) - calls(plain_nothing, kCalls);
     const std::uint32_t inside = instructions_of(Stage::rest);
     added_inside = (inside + kCalls / 2) / kCalls;
     added_outside = (both - inside + kCalls / 2) / kCalls;
     visited = 0;
+    depth = 0;
 }
 
 std::uint32_t take_wrapper_instructions() {
