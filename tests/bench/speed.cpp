@@ -24,6 +24,7 @@
 #include "host_sim/beat_synthesis.hpp"
 #include "host_sim/world.hpp"
 #include "tests/bench/dsp_reference.hpp"
+#include "tests/bench/os_cfar_by_selection.hpp"
 #include "tests/bench/peer_kissfft16.hpp"
 #include "tests/tracking/joint_events.hpp"
 #include "tracking/jpda.hpp"
@@ -243,36 +244,6 @@ void add_map(Tasks& tasks) {
 
 // --- OS-CFAR ---
 
-/// The definition: sort the reference cells of every cell, or only find the k-th.
-template <class Select>
-void cfar_by_selection(const dsp::PowerMap& map, const dsp::OsCfar& cfar, dsp::CellMask& hits,
-                       Select select) {
-    const dsp::CfarConfig& config = cfar.config();
-    hits = {};
-    for (int r = config.first_range_cell; r < dsp::kRangeCells; ++r) {
-        for (int d = 0; d < dsp::kDopplerCells; ++d) {
-            std::array<std::uint16_t, dsp::kMaxReferenceCells> cell;
-            std::size_t count = 0;
-            for (int i = 0; i < config.doppler_reference; ++i) {
-                const int distance = config.doppler_guard + 1 + config.spacing * i;
-                cell[count++] = map.at(r, d + distance);
-                cell[count++] = map.at(r, d - distance);
-            }
-            int missing = 2 * config.range_reference;
-            for (int distance = config.range_guard + 1; missing > 0; distance += config.spacing) {
-                for (const int at : {r + distance, r - distance}) {
-                    if (missing == 0 || at < config.first_range_cell || at >= dsp::kRangeCells) continue;
-                    cell[count++] = map.at(at, d);
-                    --missing;
-                }
-            }
-            const auto kth = cell.begin() + config.rank - 1;
-            select(cell.begin(), kth, cell.begin() + static_cast<std::ptrdiff_t>(count));
-            if (map.at(r, d) > *kth + cfar.threshold()) hits.set(r, d);
-        }
-    }
-}
-
 struct CfarCase {
     dsp::PowerMap map{};
     dsp::OsCfar cfar{dsp::CfarConfig{}};
@@ -295,13 +266,13 @@ void add_cfar(Tasks& tasks) {
         DoNotOptimize(data->ours);
     };
     const auto sorting = [data] {
-        cfar_by_selection(data->map, data->cfar, data->theirs,
-                          [](auto first, auto, auto last) { std::sort(first, last); });
+        os_cfar_by_selection(data->map, data->cfar, data->theirs,
+                             [](auto first, auto, auto last) { std::sort(first, last); });
         DoNotOptimize(data->theirs);
     };
     const auto selecting = [data] {
-        cfar_by_selection(data->map, data->cfar, data->theirs,
-                          [](auto first, auto kth, auto last) { std::nth_element(first, kth, last); });
+        os_cfar_by_selection(data->map, data->cfar, data->theirs,
+                             [](auto first, auto kth, auto last) { std::nth_element(first, kth, last); });
         DoNotOptimize(data->theirs);
     };
     const auto same = [&] {
