@@ -190,6 +190,10 @@ int main(int argc, char** argv) {
     app.add_option("--seed", o.seed, "of noise, fluctuation and clutter")->capture_default_str();
     auto* tracker =
         app.add_option("--tracker", a.tracker, "data association: " + tracker_names())->capture_default_str();
+    auto* nonparametric =
+        app.add_flag("--nonparametric", o.nonparametric,
+                     "clutter density from the measurements in each track's gate; else known, "
+                     "raised where detections keep being nobody's");
     app.add_option("--can", o.bus, "CAN interface, or loopback: a bus inside this program")
         ->capture_default_str();
     app.add_option("--log", o.log, "write all CAN traffic, in the format of candump -L");
@@ -215,7 +219,7 @@ int main(int argc, char** argv) {
             if (input != other) input->excludes(other);
     }
     waveform->excludes(scenario);
-    for (auto* other : {tracker, record, plot, realtime, speed, list}) hil->excludes(other);
+    for (auto* other : {tracker, nonparametric, record, plot, realtime, speed, list}) hil->excludes(other);
 
     try {
         app.parse(argc, argv);

@@ -261,6 +261,7 @@ struct Simulation::Parts {
         auto config = radar_config(waveform, world ? world->scenario().front_end.adc_bits : kWidestConverter,
                                    o.tracker);
         if (o.tracker_level) config.tracker.ijipda.level = *o.tracker_level;
+        config.tracker.gate.nonparametric = o.nonparametric;
         if (!config.valid())
             throw InputError("waveform: no valid configuration of the firmware follows from it");
         radar =

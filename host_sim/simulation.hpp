@@ -36,6 +36,7 @@ struct SimulationOptions {
     std::optional<std::uint64_t> frames;  ///< stop after so many; >= 1
     tracking::Associator tracker = tracking::Associator::ospda;
     std::optional<int> tracker_level;  ///< of iterative JIPDA; the radar's own if not given
+    bool nonparametric = false;        ///< clutter density from each gate's measurements, not from the map
     std::string bus = kLoopback;       ///< or a SocketCAN interface
     std::filesystem::path log;         ///< candump -L of all that the radar sends and hears
     std::filesystem::path record;      ///< beat frames as the radar took them

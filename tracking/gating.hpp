@@ -27,6 +27,9 @@ struct GateConfig {
     /// lambda, false detections a frame per m (m/s); below 2^-22 it is taken as 2^-22. Larger than thermal
     /// false alarms alone (about 2e-5) so that one doubtful detection does not outweigh everything known.
     S clutter_density = constant<S>(5, 10'000);
+    /// Nonparametric: lambda from the measurements in each track's gate in place of clutter_density. For
+    /// clutter nobody knows; a known density is better, since a gate holds few measurements.
+    bool nonparametric = false;
     /// Least standard deviations of a measurement: the reflecting point wanders over a vehicle, and two
     /// echoes in one cell pull each other, whatever the signal-to-noise ratio says.
     S min_range_sigma_m = constant<S>(15, 100);
@@ -128,9 +131,8 @@ class Gate {
         }
     }
 
-    /// The gate of a filled row for the rank-based associators: clutter expected in it, at the accuracy of
-    /// its first measurement, and the target's strength. ln V = ln(g^2 / 2) - ln N(0; 0, S), since V = pi g^2
-    /// sqrt|S|.
+    /// The gate of a filled row for the rank-based associators: clutter expected in it, and the target's
+    /// strength.
     [[nodiscard]] RankInput<S> rank_input(const AssociationRow<S>& row, const Track<S>& track,
                                           std::span<const Measurement<S>> measurements) const {
         constexpr auto kNepersPerDecibel = constant<S>(230'258'509, 1'000'000'000);
@@ -138,11 +140,21 @@ class Gate {
         RankInput<S> out;
         out.log_spread = snr > S(0) ? snr + ln(S(S(1) + exp(-snr))) : ln(S(S(1) + exp(snr)));
         if (row.count == 0) return out;
-        const Ldl<S> s(innovation_covariance(track.covariance,
-                                             noise(measurements[row.item[0].measurement], row.obscured)));
-        out.log_gate_clutter = floored_ln(config_.clutter_density) + ln(S(config_.gate * constant<S>(1, 2))) -
-                               s.log_density(S(0));
+        out.log_gate_clutter = floored_ln(config_.clutter_density) + log_volume(row, track, measurements);
         return out;
+    }
+
+    /// ln of the clutter density that a filled row shows over config().clutter_density: of its m measurements
+    /// PD PG psi are expected to be the target's, the others lie in the volume V of the gate, so the density
+    /// is (m - PD PG psi) / V, with at least half a measurement. 0 for an empty row. Musicki and Evans 2004.
+    [[nodiscard]] S log_counted_excess(const AssociationRow<S>& row, const Track<S>& track,
+                                       std::span<const Measurement<S>> measurements) const {
+        if (row.count == 0) return S(0);
+        const S pd = row.obscured ? config_.obscured_detection_probability : config_.detection_probability;
+        const S clutter = S(row.count + row.dropped) - pd * gate_probability_ * track.existence;
+        const S least = constant<S>(1, 2);
+        return ln(clutter < least ? least : clutter) - log_volume(row, track, measurements) -
+               floored_ln(config_.clutter_density);
     }
 
     /// ln(PD / lambda) and ln(1 - PD PG).
@@ -152,6 +164,15 @@ class Gate {
 
   private:
     static constexpr int kMaxFolds = 3;
+
+    /// ln V of a gate that is not empty, at the accuracy of its first measurement: ln(g^2 / 2) - ln N(0; 0,
+    /// S), since V = pi g^2 sqrt|S|.
+    [[nodiscard]] S log_volume(const AssociationRow<S>& row, const Track<S>& track,
+                               std::span<const Measurement<S>> measurements) const {
+        const Ldl<S> s(innovation_covariance(track.covariance,
+                                             noise(measurements[row.item[0].measurement], row.obscured)));
+        return ln(S(config_.gate * constant<S>(1, 2))) - s.log_density(S(0));
+    }
 
     /// ln of a number of at least 2^-22: a certainty stays finite, so that comparing certainties works.
     static S floored_ln(S v) {

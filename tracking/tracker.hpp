@@ -180,8 +180,8 @@ class Tracker {
     [[nodiscard]] bool obscured(const Track<S>& track) const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
                                        std::uint64_t usable, TrackerReport& report);
-    void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S& existence,
-                         std::span<const Measurement<S>> measurements);
+    void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S log_excess,
+                         S& existence, std::span<const Measurement<S>> measurements);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
     bool best_start(const Pending& from, const Measurement<S>& to, S& distance2, Track<S>& track) const;
@@ -291,11 +291,21 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         const Track<S>& t = track_[i];
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
-        gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t), log_excess_);
+        S counted(0);
+        if (config_.gate.nonparametric) {
+            gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t));
+            counted = gate_.log_counted_excess(row, t, measurements);
+            for (Candidate<S>& c : row.candidates()) c.log_ratio -= counted;
+        } else {
+            gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t), log_excess_);
+        }
         report.gate_overflow += row.dropped;
         existence[rows] = t.existence;
-        if (by_modes()) associate_modes(modes_[i], t.x, row, existence[rows], measurements);
-        if (uses_rank(config_.associator)) rank[rows] = gate_.rank_input(row, t, measurements);
+        if (by_modes()) associate_modes(modes_[i], t.x, row, counted, existence[rows], measurements);
+        if (uses_rank(config_.associator)) {
+            rank[rows] = gate_.rank_input(row, t, measurements);
+            rank[rows].log_gate_clutter += counted;
+        }
         ++rows;
     }
     if (!by_modes()) {
@@ -327,7 +337,7 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
 /// alike.
 template <class S>
 void Tracker<S>::associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row,
-                                 S& existence, std::span<const Measurement<S>> measurements) {
+                                 S log_excess, S& existence, std::span<const Measurement<S>> measurements) {
     std::array<GatedMeasurement<S>, kMaxGated> gated;
     std::array<S, kMaxGated> beta;
     const auto count = static_cast<std::size_t>(row.count);
@@ -336,8 +346,10 @@ void Tracker<S>::associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, Ass
         const Vec2<S> nu = gate_.innovation(x, m.z);
         gated[c] = {{x[0] + nu[0], x[1] + nu[1]}, gate_.noise(m, row.obscured)};
     }
-    row.missed = row.missed_weight = pda_update<S, 2, 2>(modes, existence, {gated.data(), count},
-                                                         gate_.sensor(row.obscured), {beta.data(), count});
+    SensorLogs<S> sensor = gate_.sensor(row.obscured);
+    sensor.detected -= log_excess;
+    row.missed = row.missed_weight =
+        pda_update<S, 2, 2>(modes, existence, {gated.data(), count}, sensor, {beta.data(), count});
     for (std::size_t c = 0; c < count; ++c) row.item[c].beta = row.item[c].weight = beta[c];
 }
 

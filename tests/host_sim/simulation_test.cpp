@@ -71,6 +71,18 @@ TEST(Simulation, EveryTrackerFollowsTheFourTargets) {
     }
 }
 
+TEST(Simulation, EveryTrackerWithClutterCountedInTheGates) {
+    for (std::size_t i = 0; i < tracking::kAssociatorNames.size(); ++i) {
+        auto options = quiet("four-targets", 60);
+        options.tracker = static_cast<tracking::Associator>(i);
+        options.nonparametric = true;
+        const auto m = simulate(options).metrics;
+        LONGS_EQUAL(4, m.confirmed_tracks);
+        LONGS_EQUAL(0, m.false_tracks);
+        LONGS_EQUAL(0, m.id_switches);
+    }
+}
+
 TEST(Simulation, LevelOfIterativeJipdaIsTaken) {
     auto options = quiet("four-targets", 20);
     options.tracker = tracking::Associator::ijipda;

@@ -43,10 +43,12 @@ struct Agreement {
     }
 };
 
-Agreement compare(const std::vector<Road>& roads, int frames, Associator associator) {
+Agreement compare(const std::vector<Road>& roads, int frames, Associator associator,
+                  bool nonparametric = false) {
     TrackerConfig<double> reference_config;
     TrackerConfig<Real> fixed_config;
     reference_config.associator = fixed_config.associator = associator;
+    reference_config.gate.nonparametric = fixed_config.gate.nonparametric = nonparametric;
     Agreement result;
     std::uint64_t seed = 1;
     for (const Road& road : roads) {
@@ -104,6 +106,16 @@ TEST(FixedAgainstDouble, EveryAssociatorAgrees) {
             "range rate within %.5f m/s (bar 0.02)\n",
             tracking::name_of(associator).data(), a.frames, 100.0 * a.same / a.frames, a.range_m, a.rate_mps);
         CHECK(a.frames >= 2000);
+        CHECK(a.same >= 0.999 * a.frames);
+        CHECK(a.range_m <= 0.05);
+        CHECK(a.rate_mps <= 0.02);
+        CHECK(a.confirmed >= 5 * a.frames);
+    }
+}
+
+TEST(FixedAgainstDouble, NonparametricClutterDensityAgrees) {
+    for (const auto associator : {Associator::ospda, Associator::lm_ihpda, Associator::imm_pdaf}) {
+        const Agreement a = compare(roads(), 120, associator, true);
         CHECK(a.same >= 0.999 * a.frames);
         CHECK(a.range_m <= 0.05);
         CHECK(a.rate_mps <= 0.02);

@@ -167,3 +167,32 @@ TEST(Gating, ObscuredTrackTrustsLessAndExpectsLess) {
     DOUBLES_EQUAL(0.09 + 1, value(gate.noise(measurements[0], true)[0]), 1e-6);
     DOUBLES_EQUAL(0.01 + 0.25, value(gate.noise(measurements[0], true)[1]), 1e-6);
 }
+
+namespace {
+/// Of m measurements in a gate of volume V, PD PG psi are the target's.
+template <class S>
+void clutter_is_counted_in_the_gate() {
+    const Gate<S> gate{GateConfig<S>{}};
+    const Eigen::Matrix2d s{{.13, .01}, {.01, .03}};
+    const double volume = M_PI * 16 * std::sqrt(s.determinant());
+    tracking::Track<S> track;
+    track.x = {S(50), S(-10)};
+    track.covariance = covariance<S>();
+    track.existence = constant<S>(3, 4);
+    std::vector<Measurement<S>> measurements;
+    AssociationRow<S> row;
+    DOUBLES_EQUAL(0, value(gate.log_counted_excess(row, track, measurements)), 0);
+    for (int m = 1; m <= 20; ++m) {
+        measurements.push_back(at<S>(S(50), S(-10)));
+        gate.fill(row, track.x, track.covariance, measurements, kAll, false);
+        const double density = std::max(m - 0.9 * (1 - std::exp(-8.0)) * 0.75, 0.5) / volume;
+        DOUBLES_EQUAL(std::log(density / 5e-4), value(gate.log_counted_excess(row, track, measurements)),
+                      2e-4);
+    }
+}
+}  // namespace
+
+TEST(Gating, ClutterIsCountedInTheGateWhenNobodyKnowsIt) {
+    clutter_is_counted_in_the_gate<double>();
+    clutter_is_counted_in_the_gate<Real>();
+}
