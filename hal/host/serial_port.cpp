@@ -85,7 +85,7 @@ int connect_socket(const std::string& path) {
 }
 
 std::string explain(const std::string& path, std::uint32_t baud, int cause) {
-    const std::string what = "serial line " + path + ": " + std::strerror(cause);
+    std::string what = "serial line " + path + ": " + std::strerror(cause);
     switch (cause) {
         case ENOENT:
             return what + "; is the board plugged in? (ls -l /dev/serial/by-id)";

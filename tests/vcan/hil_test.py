@@ -114,8 +114,8 @@ with Process(BRIDGE, "vcan1", "vcan0") as bridge:
         cable.fault = "cut"
         code, report, text = hil(cable.device, "--lockstep", "--scenario", "approach", "--frames", "1", name="cut", patience=3)
         check("a cut serial line: says so", (code, "no beat frame reached the board" in text), (2, True))
-        cable.fault = "stuck"
-        code, _, text = hil(cable.device, "--lockstep", "--scenario", "approach", "--frames", "1", name="stuck", patience=3)
+        cable.fault = "stuck"  # the terminal holds one frame and a half
+        code, _, text = hil(cable.device, "--lockstep", "--scenario", "approach", "--frames", "3", name="stuck", patience=3)
         check("a serial line that takes nothing: says so", (code, "the board takes no bytes" in text), (1, True))
         cable.fault = "cut"
 
