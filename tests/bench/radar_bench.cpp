@@ -9,6 +9,7 @@
 
 #include "tests/bench/accuracy_association.hpp"
 #include "tests/bench/accuracy_dsp.hpp"
+#include "tests/bench/accuracy_existence.hpp"
 #include "tests/bench/accuracy_sim.hpp"
 #include "tests/bench/row.hpp"
 
@@ -43,8 +44,9 @@ int main(int argc, char** argv) {
         "signal processing against double precision and the Cramer-Rao bound, tracks against the truth");
     std::string part = "all";
     accuracy
-        ->add_option("--only", part,
-                     "dsp: signal processing; association: exact JPDA; system: scenarios and recordings")
+        ->add_option(
+            "--only", part,
+            "dsp: signal processing; association: solvers against listing; system: scenarios and recordings")
         ->check(CLI::IsMember({"all", "dsp", "association", "system"}));
     std::string recordings = RADAR_RECORDINGS_DIR;
     accuracy
@@ -68,6 +70,7 @@ int main(int argc, char** argv) {
     const auto wanted = [&part](const char* name) { return part == "all" || part == name; };
     if (wanted("dsp")) add(bench::accuracy_dsp());
     if (wanted("association")) add(bench::accuracy_association());
+    if (wanted("association")) add(bench::accuracy_existence());
     if (wanted("system")) add(bench::accuracy_sim(recordings));
     std::printf("%zu figures, %d bars missed\n", rows.size(), missed);
     if (!json.empty() && !write_json(json, rows)) {
