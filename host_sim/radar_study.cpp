@@ -71,6 +71,11 @@ int main(int argc, char** argv) {
         command->add_option("--out", out, "directory of the results, made if missing")->required();
         command->add_option("--threads", options.run.threads, "default: all cores")
             ->check(CLI::Range(1, 1024));
+        if (kStudies[i].run == sim::run_lowsnr)
+            command
+                ->add_option("--calibration", options.calibration,
+                             "runs that set the confirmation thresholds; default 200")
+                ->check(CLI::Range(1, 1'000'000));
         if (kStudies[i].run == sim::run_lee2000)
             command->add_option("--scenarios", scenarios,
                                 "directory of lee2000.json and the geometries it names");
