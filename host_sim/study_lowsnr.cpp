@@ -594,7 +594,7 @@ void draw(const std::filesystem::path& directory, const Scores& scores, std::uin
                << " confirmed false tracks a run'\nset ylabel '"
                << (quantity == 0 ? "targets with a confirmed true track / %"
                                  : "RMS position error of these / m")
-               << "'\nset yrange [0:*]\nplot ";
+               << "'\nset yrange [" << (quantity == 0 ? "0" : "*<10") << ":*]\nplot ";
             for (std::size_t m = 0; m < kMethods.size(); ++m)
                 gp << (m > 0 ? ", " : "") << "'" << data
                    << "' using 1:" << 2 * static_cast<int>(m) + 2 + quantity << " with linespoints lw 2 pt "

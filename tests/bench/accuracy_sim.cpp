@@ -13,7 +13,7 @@
 
 #include "dsp/detect.hpp"
 #include "hal/host/frame_file_source.hpp"
-#include "host_sim/simulation.hpp"
+#include "tests/host_sim/quiet_run.hpp"
 #include "tracking/tracker.hpp"
 
 namespace bench {
@@ -21,24 +21,11 @@ namespace bench {
 namespace {
 
 using dsp::Real;
+using sim_test::quiet;
+using sim_test::simulate;
 
 double number(Real v) {
     return tracking::scalar_from<double>(v);
-}
-
-sim::SimulationOptions quiet(const std::string& scenario, std::uint64_t seed) {
-    sim::SimulationOptions o;
-    o.scenario = sim::load_scenario(scenario);
-    o.seed = seed;
-    o.quiet = true;
-    return o;
-}
-
-sim::SimulationResult run(const sim::SimulationOptions& options) {
-    sim::Simulation simulation(options);
-    while (simulation.step()) {
-    }
-    return simulation.result();
 }
 
 template <class S>
@@ -76,7 +63,7 @@ std::vector<Row> four_targets(int seeds) {
     int lost = 0;
     int switches = 0;
     for (int seed = 1; seed <= seeds; ++seed) {
-        const auto m = run(quiet("four-targets", static_cast<std::uint64_t>(seed))).metrics;
+        const auto m = simulate(quiet("four-targets", {}, static_cast<std::uint64_t>(seed))).metrics;
         if (m.targets != 4 || m.never_confirmed > 0) confirmation_s = std::numeric_limits<double>::infinity();
         confirmation_s = std::max(confirmation_s, m.first_confirmation_s.value_or(0));
         range_rmse_m = std::max(range_rmse_m, m.range_rmse_m);
@@ -93,9 +80,9 @@ std::vector<Row> four_targets(int seeds) {
 }
 
 std::vector<Row> empty_road(double hours) {
-    auto o = quiet("empty", 1);
+    auto o = quiet("empty");
     o.scenario->duration_s = hours * 3600;
-    const auto m = run(o).metrics;
+    const auto m = simulate(o).metrics;
     std::ostringstream what;
     what << "empty road, " << hours << " h simulated: false confirmed tracks";
     return {{what.str(), static_cast<double>(m.false_tracks), std::max(1.0, std::floor(hours)), false, ""}};
@@ -248,9 +235,7 @@ struct Recording {
 std::vector<Recording> detections_of_scenarios() {
     std::vector<Recording> recordings;
     for (const std::string& name : sim::shipped_scenarios()) {
-        auto o = quiet(name, 1);
-        o.frames = 600;
-        sim::Simulation simulation(o);
+        sim::Simulation simulation(quiet(name, 600));
         Recording& recording = recordings.emplace_back();
         recording.config = simulation.view().radar.config().tracker;
         while (simulation.step())
@@ -314,9 +299,9 @@ std::vector<Row> fixed_against_double() {
 }
 
 std::vector<Row> speed() {
-    const auto o = quiet("four-targets", 1);
+    const auto o = quiet("four-targets");
     const auto start = std::chrono::steady_clock::now();
-    const auto result = run(o);
+    const auto result = simulate(o);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     return {{"four-targets, synthesis included: times real time on one core",
              static_cast<double>(result.frames) * 0.1 / took.count(), 20, true, "x"}};

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <sys/wait.h>
 
 #include <CppUTest/TestHarness.h>
 
@@ -19,7 +20,8 @@ constexpr bool kSlow = false;
 const std::filesystem::path kRoot = std::filesystem::temp_directory_path() / "radar_study_test";
 
 int shell(const std::string& command) {
-    return std::system((command + " >/dev/null 2>&1").c_str());
+    const int status = std::system((command + " >/dev/null 2>&1").c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 std::string study(const char* out, const std::string& options) {
@@ -103,10 +105,12 @@ TEST(RadarStudy, OtherStudiesTooGiveTheSameTablesHoweverTheyAreRun) {
 
 TEST(RadarStudy, ErrorsAreToldAndLoseNothing) {
     prepare();
-    CHECK(shell(study("one", "--runs 4 --seed 9")) != 0);
-    CHECK(shell(study("one", "--runs 1")) != 0);
-    CHECK(shell(study("/proc/none", "--runs 4")) != 0);
-    CHECK(shell(std::string(RADAR_STUDY) + " lee1999 --out x") != 0);
-    CHECK(shell(std::string(RADAR_STUDY)) != 0);
+    LONGS_EQUAL(1, shell(study("one", "--runs 4 --seed 9")));
+    LONGS_EQUAL(1, shell(study("one", "--runs 1")));
+    LONGS_EQUAL(1, shell(study("/proc/none", "--runs 4")));
+    LONGS_EQUAL(1, shell(std::string(RADAR_STUDY) + " lee1999 --out x"));
+    LONGS_EQUAL(1, shell(std::string(RADAR_STUDY)));
+    LONGS_EQUAL(1, shell(std::string(RADAR_STUDY) + " lowsnr"));
+    LONGS_EQUAL(0, shell(std::string(RADAR_STUDY) + " lowsnr --help"));
     LONGS_EQUAL(0, shell(study("one", "--runs 4")));
 }
