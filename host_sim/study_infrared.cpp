@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -239,12 +238,9 @@ Tables make_tables(const std::vector<Runs>& runs, const std::vector<double>& det
         "false: confirmed tracks more than %g pixels from every target, mean over the frames.\n\nClaims\n",
         kDensest, kTrue_px);
     const auto claim = [&](const std::string& what, const Estimate& e, const char* unit, bool equal) {
-        const char* verdict = equal ? (e.low <= 0 && e.high >= 0 ? "holds" : "does not hold")
-                                    : (e.low > 0 ? "holds" : (e.high < 0 ? "does not hold" : "not decided"));
-        out.text += print("  %-78s %+6.2f %s (%+.2f .. %+.2f)  %s\n", what.c_str(), e.value, unit, e.low,
-                          e.high, verdict);
-        out.json["claims"].push_back(
-            {{"claim", what}, {"value", {e.value, e.low, e.high}}, {"verdict", verdict}});
+        const char* verdict = equal ? verdict_equal(e) : verdict_above(e);
+        out.text += claim_line(what, 78, e, unit, verdict);
+        out.json["claims"].push_back(claim_json("claim", what, e, verdict));
     };
     claim("2-D assignment keeps more tracks through the crossing than IHPDA alone",
           difference(runs[kOptimal], runs[kAlone], kept_percent), "points", false);
@@ -272,26 +268,19 @@ Tables make_tables(const std::vector<Runs>& runs, const std::vector<double>& det
     return out;
 }
 
-double cpu_ms() {
-    std::timespec t{};
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
-
 /// Table 5: processor time of the tracker in the densest frame, best of some repetitions of a sequence.
 std::string cost_table(const Detections& detections) {
     std::string out =
         print("\nTable 5. Milliseconds of frame %d on this machine, all of the tracker (paper, i5-2500K)\n",
               kDensest);
     for (std::size_t m = 0; m < kMethods.size(); ++m) {
-        double best = 1e9;
-        for (int i = 0; i < 20; ++i) {
+        const double best = best_of(20, [&] {
             PlaneTracker tracker(tracker_of(kMethods[m]));
             for (std::size_t k = 0; k + 1 < kDensest; ++k) tracker.step(detections[k]);
             const double before = cpu_ms();
             tracker.step(detections[kDensest - 1]);
-            best = std::min(best, cpu_ms() - before);
-        }
+            return cpu_ms() - before;
+        });
         out += print("  %-26s%8.3f%s\n", kMethods[m].name, best,
                      m == kOptimal ? "   (0.360)" : (m == kLinear ? "   (0.302)" : ""));
     }

@@ -91,7 +91,7 @@ class Pictures {
         std::ostringstream gp;
         gp << kGrid << "set xrange [0:" << geometry_.duration_s << "]\nset lmargin 9\n"
            << "set palette maxcolors 4 defined (1 '#d62728', 2 '#1f77b4', 3 '#2ca02c', 4 '#9467bd')\n"
-           << "unset colorbox\nset cbrange [0.5:4.5]\nset key top left\nset multiplot layout "
+           << "unset colorbox\nset cbrange [0.5:4.5]\nset key outside top right\nset multiplot layout "
            << geometry_.pairs.size() << ",1 title 'Tracking four targets using " << filter.name << " ("
            << condition_.label << ", first run)'\n";
         for (const auto& [a, b] : geometry_.pairs) {

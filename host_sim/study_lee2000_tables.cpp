@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -337,16 +336,12 @@ double association_us(const StudyFilter& filter) {
         }
     }
     const auto work = std::make_unique<tracking::JpdaWorkspace<S>>();
-    using Clock = std::chrono::steady_clock;
-    double best = 1e9;
-    for (int batch = 0; batch < 20; ++batch) {
-        constexpr int kRepeats = 200;
-        const auto start = Clock::now();
+    return best_of(20, [&] {
+        constexpr int kRepeats = 20;
+        const double before = cpu_ms();
         for (int i = 0; i < kRepeats; ++i) tracking::associate<S>(rows, filter.associator, order, *work);
-        best = std::min(best,
-                        std::chrono::duration<double, std::micro>(Clock::now() - start).count() / kRepeats);
-    }
-    return best;
+        return 1e3 * (cpu_ms() - before) / kRepeats;
+    });
 }
 
 }  // namespace

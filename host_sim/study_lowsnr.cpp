@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -204,6 +203,7 @@ std::vector<double> calibrate_unit(std::uint64_t seed, std::size_t unit) {
 using Thresholds = std::array<std::array<double, kMethods.size()>, kConditions.size()>;
 
 Thresholds thresholds_from(const std::vector<std::vector<double>>& units) {
+    const double runs = static_cast<double>(units.size() / kConditions.size());
     std::array<std::array<std::vector<double>, kMethods.size()>, kConditions.size()> passed;
     for (std::size_t u = 0; u < units.size(); ++u) {
         const double* in = units[u].data();
@@ -219,7 +219,7 @@ Thresholds thresholds_from(const std::vector<std::vector<double>>& units) {
         for (std::size_t m = 0; m < kMethods.size(); ++m) {
             auto& all = passed[c][m];
             std::sort(all.begin(), all.end(), std::greater<>());
-            const auto wanted = static_cast<std::size_t>(kConditions[c].false_tracks * kLowSnrCalibration);
+            const auto wanted = static_cast<std::size_t>(kConditions[c].false_tracks * runs);
             out[c][m] = wanted < all.size() ? std::min(all[wanted], kLargestThreshold) : kLeastThreshold;
         }
     }
@@ -366,14 +366,10 @@ Estimate rms_improvement(const Runs& from, const Runs& to) {
     return improvement_of(pairs, from.size());
 }
 
-/// What an interval says about "is above zero".
-const char* verdict(const Estimate& e) {
-    return e.low > 0 ? "holds" : (e.high < 0 ? "does not hold" : "not decided");
-}
-
 class Report {
   public:
-    Report(const Scores& scores, const Thresholds& thresholds) : scores_(scores), thresholds_(thresholds) {}
+    Report(const Scores& scores, const Thresholds& thresholds, std::size_t calibration)
+        : scores_(scores), thresholds_(thresholds), calibration_(calibration) {}
 
     std::string text() {
         std::string out = print(
@@ -388,7 +384,7 @@ class Report {
             "not the paper's number, none of them gives it:\nwith amplitude information one strong return "
             "makes a track "
             "sure of itself.\n",
-            scores_[0][0].size(), kLowSnrCalibration,
+            scores_[0][0].size(), calibration_,
             low_snr_tracker(13, TrackStart::one_point, 0).detection_probability, kTrue_m,
             low_snr_tracker(13, TrackStart::one_point, 0).gate, kLeastThreshold);
         for (std::size_t c = 0; c < kConditions.size(); ++c) out += condition_table(c);
@@ -480,11 +476,9 @@ class Report {
     }
 
     std::string claim(const char* what, std::size_t c, const Estimate& e, const char* unit) {
-        claims_[what].push_back({{"condition", kConditions[c].label},
-                                 {"value", {e.value, e.low, e.high}},
-                                 {"verdict", verdict(e)}});
-        return print("  %-24s %+7.2f %s (%+.2f .. %+.2f)  %s\n", kConditions[c].label, e.value, unit, e.low,
-                     e.high, verdict(e));
+        const char* verdict = verdict_above(e);
+        claims_[what].push_back(claim_json("condition", kConditions[c].label, e, verdict));
+        return claim_line(kConditions[c].label, 24, e, unit, verdict);
     }
 
     std::string claims() {
@@ -522,18 +516,12 @@ class Report {
 
     const Scores& scores_;
     const Thresholds& thresholds_;
+    std::size_t calibration_;
     nlohmann::json claims_;
 };
 
-double cpu_ms() {
-    std::timespec t{};
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
-
 /// Table 1: processor time a frame of everything the tracker does, one thread.
-std::string cost_table(const Thresholds& thresholds, std::uint64_t seed) {
-    constexpr std::uint64_t kRuns = 10;
+std::string cost_table(const Thresholds& thresholds, std::uint64_t seed, std::uint64_t runs) {
     std::string out =
         print("\nTable 1. Milliseconds a frame on this machine: mean, longest (paper's mean, i7-6700)\n");
     for (const std::size_t c : {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{3}}) {
@@ -541,7 +529,7 @@ std::string cost_table(const Thresholds& thresholds, std::uint64_t seed) {
         for (std::size_t m = 0; m < kMethods.size(); ++m) {
             double sum = 0;
             double longest = 0;
-            for (std::uint64_t run = 0; run < kRuns; ++run) {
+            for (std::uint64_t run = 0; run < runs; ++run) {
                 const auto frames = simulate_low_snr(kConditions[c].snr_db, seed, kStudyPurpose, run);
                 double before = cpu_ms();
                 run_tracker(c, m, frames, thresholds[c][m],
@@ -554,7 +542,8 @@ std::string cost_table(const Thresholds& thresholds, std::uint64_t seed) {
             }
             const double paper =
                 kConditions[c].snr_db < 15 ? kMethods[m].paper_ms_13 : kMethods[m].paper_ms_20;
-            out += print("  %-16s%9.3f%9.2f   (%s)\n", kMethods[m].name, sum / kRuns / kLowSnrFrames, longest,
+            out += print("  %-16s%9.3f%9.2f   (%s)\n", kMethods[m].name,
+                         sum / static_cast<double>(runs) / kLowSnrFrames, longest,
                          paper > 0 ? print("%.3f", paper).c_str() : "-");
         }
     }
@@ -605,7 +594,7 @@ void draw(const std::filesystem::path& directory, const Scores& scores, std::uin
                << " confirmed false tracks a run'\nset ylabel '"
                << (quantity == 0 ? "targets with a confirmed true track / %"
                                  : "RMS position error of these / m")
-               << "'\nset yrange [0:*]\nplot ";
+               << "'\nset yrange [" << (quantity == 0 ? "0" : "*<10") << ":*]\nplot ";
             for (std::size_t m = 0; m < kMethods.size(); ++m)
                 gp << (m > 0 ? ", " : "") << "'" << data
                    << "' using 1:" << 2 * static_cast<int>(m) + 2 + quantity << " with linespoints lw 2 pt "
@@ -631,7 +620,7 @@ void run_lowsnr(const StudyOptions& options, const StudyRanks& ranks) {
     StudyWork calibration;
     calibration.name = std::string(kName) + "_calibration";
     calibration.configuration = configuration;
-    calibration.units = kLowSnrCalibration * kConditions.size();
+    calibration.units = options.calibration * kConditions.size();
     calibration.run = [&](std::size_t unit) { return calibrate_unit(options.seed, unit); };
     std::vector<double> flat(kConditions.size() * kMethods.size());
     const auto calibrated = run_study_units(calibration, options.run, ranks);
@@ -654,9 +643,9 @@ void run_lowsnr(const StudyOptions& options, const StudyRanks& ranks) {
 
     const Scores scores = scores_from(units);
     const auto& directory = options.run.directory;
-    Report report(scores, thresholds);
+    Report report(scores, thresholds, options.calibration);
     const std::string text = report.text();
-    const std::string cost = cost_table(thresholds, options.seed);
+    const std::string cost = cost_table(thresholds, options.seed, std::min<std::uint64_t>(10, options.runs));
     std::printf("%s%s", text.c_str(), cost.c_str());
     write_text(directory / "lowsnr.txt", text);
     write_text(directory / "lowsnr_cost.txt", cost);

@@ -19,7 +19,6 @@ struct LowSnrFrame {
 };
 
 inline constexpr int kLowSnrFrames = 30;
-inline constexpr std::size_t kLowSnrCalibration = 200;
 
 /// Run `index`, the same whoever computes it.
 std::vector<LowSnrFrame> simulate_low_snr(double snr_db, std::uint64_t seed, std::uint64_t purpose,
@@ -29,7 +28,7 @@ std::vector<LowSnrFrame> simulate_low_snr(double snr_db, std::uint64_t seed, std
 /// JIPDA-AI.
 PlaneTrackerConfig low_snr_tracker(double snr_db, TrackStart start, int level);
 
-/// options.runs of each condition, and kLowSnrCalibration more to find the thresholds.
+/// options.runs of each condition, and options.calibration more to find the thresholds.
 /// Runs what is missing, writes lowsnr.txt, lowsnr.csv, lowsnr.json, lowsnr_cost.txt and the pictures into
 /// the directory, and prints the tables. Throws InputError.
 void run_lowsnr(const StudyOptions& options, const StudyRanks& ranks);

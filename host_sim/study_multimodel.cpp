@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -311,10 +310,6 @@ Estimate lost_of(const Runs& runs) {
     return mean_of(values);
 }
 
-const char* verdict(const Estimate& e) {
-    return e.low > 0 ? "holds" : (e.high < 0 ? "does not hold" : "not decided");
-}
-
 struct Tables {
     std::string text;
     std::string csv;
@@ -356,10 +351,9 @@ Tables make_tables(const std::vector<Runs>& runs) {
     }
     out.text += "\nClaims: fewer vehicles lost, and less RMS error on those that both keep\n";
     const auto state = [&](const std::string& what, const char* unit, const Estimate& e) {
-        out.text += print("  %-86s %+6.1f %s (%+.1f .. %+.1f)  %s\n", what.c_str(), e.value, unit, e.low,
-                          e.high, verdict(e));
-        out.json["claims"].push_back(
-            {{"claim", what}, {"value", {e.value, e.low, e.high}}, {"verdict", verdict(e)}});
+        const char* verdict = verdict_above(e);
+        out.text += claim_line(what, 86, e, unit, verdict);
+        out.json["claims"].push_back(claim_json("claim", what, e, verdict));
     };
     const auto claim = [&](const std::string& what, std::size_t first, std::size_t second) {
         state(what + ": error", "%", improvement(runs[first], runs[second]));
@@ -386,16 +380,13 @@ std::string cost_table(std::uint64_t seed) {
     const Scene scene = simulate(seed, 0);
     std::string out = "\nMicroseconds a frame and vehicle on this machine (best of 5)\n";
     for (std::size_t f = 0; f < kFilters; ++f) {
-        double best = 1e9;
-        for (int i = 0; i < 5; ++i) {
-            const auto start = std::chrono::steady_clock::now();
+        const double best = best_of(5, [&] {
+            const double before = cpu_ms();
             static_cast<void>(run_filter(f, scene));
-            best = std::min(
-                best,
-                std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count());
-        }
+            return cpu_ms() - before;
+        });
         out += print("  %-38s%8.2f\n", filter_name(f).c_str(),
-                     best / kFrames / static_cast<double>(vehicles().size()));
+                     1e3 * best / kFrames / static_cast<double>(vehicles().size()));
     }
     return out;
 }

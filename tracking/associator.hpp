@@ -80,12 +80,15 @@ struct AssociatorChoice {
 };
 constexpr std::optional<AssociatorChoice> associator_chosen(std::string_view text) {
     const std::size_t colon = text.find(':');
-    const std::optional<Associator> associator = associator_named(text.substr(0, colon));
+    std::string_view name = text;  // substr() can throw, and images hold no exceptions
+    if (colon != std::string_view::npos) name.remove_suffix(text.size() - colon);
+    const std::optional<Associator> associator = associator_named(name);
     if (!associator) return std::nullopt;
     if (colon == std::string_view::npos) return AssociatorChoice{*associator, std::nullopt};
     if (*associator != Associator::ijipda) return std::nullopt;
     int level = 0;
-    const std::string_view digits = text.substr(colon + 1);
+    std::string_view digits = text;
+    digits.remove_prefix(colon + 1);
     if (digits.empty() || digits.size() > 2) return std::nullopt;
     for (const char c : digits) {
         if (c < '0' || c > '9') return std::nullopt;

@@ -13,7 +13,7 @@
 
 #include "dsp/detect.hpp"
 #include "hal/host/frame_file_source.hpp"
-#include "host_sim/simulation.hpp"
+#include "tests/host_sim/quiet_run.hpp"
 #include "tracking/tracker.hpp"
 
 namespace bench {
@@ -21,24 +21,11 @@ namespace bench {
 namespace {
 
 using dsp::Real;
+using sim_test::quiet;
+using sim_test::simulate;
 
 double number(Real v) {
     return tracking::scalar_from<double>(v);
-}
-
-sim::SimulationOptions quiet(const std::string& scenario, std::uint64_t seed) {
-    sim::SimulationOptions o;
-    o.scenario = sim::load_scenario(scenario);
-    o.seed = seed;
-    o.quiet = true;
-    return o;
-}
-
-sim::SimulationResult run(const sim::SimulationOptions& options) {
-    sim::Simulation simulation(options);
-    while (simulation.step()) {
-    }
-    return simulation.result();
 }
 
 template <class S>
@@ -76,7 +63,7 @@ std::vector<Row> four_targets(int seeds) {
     int lost = 0;
     int switches = 0;
     for (int seed = 1; seed <= seeds; ++seed) {
-        const auto m = run(quiet("four-targets", static_cast<std::uint64_t>(seed))).metrics;
+        const auto m = simulate(quiet("four-targets", {}, static_cast<std::uint64_t>(seed))).metrics;
         if (m.targets != 4 || m.never_confirmed > 0) confirmation_s = std::numeric_limits<double>::infinity();
         confirmation_s = std::max(confirmation_s, m.first_confirmation_s.value_or(0));
         range_rmse_m = std::max(range_rmse_m, m.range_rmse_m);
@@ -93,9 +80,9 @@ std::vector<Row> four_targets(int seeds) {
 }
 
 std::vector<Row> empty_road(double hours) {
-    auto o = quiet("empty", 1);
+    auto o = quiet("empty");
     o.scenario->duration_s = hours * 3600;
-    const auto m = run(o).metrics;
+    const auto m = simulate(o).metrics;
     std::ostringstream what;
     what << "empty road, " << hours << " h simulated: false confirmed tracks";
     return {{what.str(), static_cast<double>(m.false_tracks), std::max(1.0, std::floor(hours)), false, ""}};
@@ -223,58 +210,98 @@ std::vector<Row> recorded_traffic(const std::filesystem::path& data) {
              "%"}};
 }
 
-std::vector<Row> fixed_against_double() {
-    double worst_range_m = 0;
-    double worst_rate_mps = 0;
-    int frames = 0;
-    int equal = 0;
+namespace {
+
+/// The radar's configuration for a simulated run, in double.
+tracking::TrackerConfig<double> as_double(const tracking::TrackerConfig<Real>& fixed) {
+    tracking::TrackerConfig<double> config;
+    config.associator = fixed.associator;
+    config.motion.period_s = number(fixed.motion.period_s);
+    config.modes.period_s = number(fixed.modes.period_s);
+    config.gate.rate_span_mps = number(fixed.gate.rate_span_mps);
+    config.gate.alias_range_m = number(fixed.gate.alias_range_m);
+    config.resolution_range_m = number(fixed.resolution_range_m);
+    config.resolution_rate_mps = number(fixed.resolution_rate_mps);
+    config.max_range_m = number(fixed.max_range_m);
+    return config;
+}
+
+struct Recording {
+    tracking::TrackerConfig<Real> config;
+    std::vector<std::vector<tracking::Measurement<Real>>> frames;
+};
+
+/// What the signal processing detects in every scenario, for all trackers the same.
+std::vector<Recording> detections_of_scenarios() {
+    std::vector<Recording> recordings;
     for (const std::string& name : sim::shipped_scenarios()) {
-        auto o = quiet(name, 1);
-        o.frames = 600;
-        sim::Simulation simulation(o);
-        const auto fixed_config =
-            sim::radar_config(simulation.waveform(), o.scenario->front_end.adc_bits, o.tracker).tracker;
-        tracking::TrackerConfig<double> config;
-        config.associator = fixed_config.associator;
-        config.motion.period_s = number(fixed_config.motion.period_s);
-        config.modes.period_s = number(fixed_config.modes.period_s);
-        config.gate.rate_span_mps = number(fixed_config.gate.rate_span_mps);
-        config.gate.alias_range_m = number(fixed_config.gate.alias_range_m);
-        config.resolution_range_m = number(fixed_config.resolution_range_m);
-        config.resolution_rate_mps = number(fixed_config.resolution_rate_mps);
-        config.max_range_m = number(fixed_config.max_range_m);
-        tracking::Tracker<double> reference(config);
-        while (simulation.step()) {
-            const firmware::Radar& radar = simulation.view().radar;
-            reference.step(measurements_of<double>(radar.detections()));
-            ++frames;
-            const auto fixed = radar.tracks();
-            const auto exact = reference.tracks();
-            bool same = fixed.size() == exact.size();
-            for (std::size_t i = 0; same && i < fixed.size(); ++i)
-                same = fixed[i].id == exact[i].id && fixed[i].state == exact[i].state;
-            if (!same) continue;
-            ++equal;
-            for (std::size_t i = 0; i < fixed.size(); ++i) {
-                worst_range_m = std::max(worst_range_m, std::fabs(number(fixed[i].x[0]) - exact[i].x[0]));
-                worst_rate_mps = std::max(worst_rate_mps, std::fabs(number(fixed[i].x[1]) - exact[i].x[1]));
+        sim::Simulation simulation(quiet(name, 600));
+        Recording& recording = recordings.emplace_back();
+        recording.config = simulation.view().radar.config().tracker;
+        while (simulation.step())
+            recording.frames.push_back(measurements_of<Real>(simulation.view().radar.detections()));
+    }
+    return recordings;
+}
+
+std::vector<tracking::Measurement<double>> as_double(const std::vector<tracking::Measurement<Real>>& fixed) {
+    std::vector<tracking::Measurement<double>> list;
+    for (const auto& m : fixed)
+        list.push_back({{number(m.z[0]), number(m.z[1])},
+                        {number(m.variance[0]), number(m.variance[1])},
+                        number(m.snr_db)});
+    return list;
+}
+
+}  // namespace
+
+std::vector<Row> fixed_against_double() {
+    const std::vector<Recording> recordings = detections_of_scenarios();
+    std::vector<Row> rows;
+    for (std::size_t a = 0; a < tracking::kAssociatorNames.size(); ++a) {
+        const auto associator = static_cast<tracking::Associator>(a);
+        double worst_range_m = 0;
+        double worst_rate_mps = 0;
+        int frames = 0;
+        int equal = 0;
+        for (const Recording& recording : recordings) {
+            auto config = recording.config;
+            config.associator = associator;
+            tracking::Tracker<Real> tracker(config);
+            tracking::Tracker<double> reference(as_double(config));
+            for (const auto& measurements : recording.frames) {
+                tracker.step(measurements);
+                reference.step(as_double(measurements));
+                ++frames;
+                const auto fixed = tracker.tracks();
+                const auto exact = reference.tracks();
+                if (!std::equal(
+                        fixed.begin(), fixed.end(), exact.begin(), exact.end(),
+                        [](const auto& f, const auto& e) { return f.id == e.id && f.state == e.state; }))
+                    continue;
+                ++equal;
+                for (std::size_t i = 0; i < fixed.size(); ++i) {
+                    worst_range_m = std::max(worst_range_m, std::fabs(number(fixed[i].x[0]) - exact[i].x[0]));
+                    worst_rate_mps =
+                        std::max(worst_rate_mps, std::fabs(number(fixed[i].x[1]) - exact[i].x[1]));
+                }
             }
         }
+        const std::string what =
+            "fixed against double, all scenarios, " + std::string(name_of(associator)) + ": ";
+        if (a == 0)
+            rows.push_back({"fixed against double, all scenarios: frames", 1.0 * frames, 2000, true, ""});
+        rows.push_back({what + "equal ids and states", 100.0 * equal / frames, 99.9, true, "%"});
+        rows.push_back({what + "range", worst_range_m, 0.05, false, "m"});
+        rows.push_back({what + "range rate", worst_rate_mps, 0.02, false, "m/s"});
     }
-    return {
-        {"fixed-point tracker against double, all scenarios: frames", static_cast<double>(frames), 2000, true,
-         ""},
-        {"fixed-point tracker against double: frames with equal ids and states", 100.0 * equal / frames, 99.9,
-         true, "%"},
-        {"fixed-point tracker against double: range, largest difference", worst_range_m, 0.05, false, "m"},
-        {"fixed-point tracker against double: range rate, largest difference", worst_rate_mps, 0.02, false,
-         "m/s"}};
+    return rows;
 }
 
 std::vector<Row> speed() {
-    const auto o = quiet("four-targets", 1);
+    const auto o = quiet("four-targets");
     const auto start = std::chrono::steady_clock::now();
-    const auto result = run(o);
+    const auto result = simulate(o);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     return {{"four-targets, synthesis included: times real time on one core",
              static_cast<double>(result.frames) * 0.1 / took.count(), 20, true, "x"}};

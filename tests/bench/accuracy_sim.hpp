@@ -18,7 +18,7 @@ std::vector<Row> walking_person(const std::filesystem::path& data);
 /// Real highway motion, `data`/comma2k19_highway, to beat signals. Prints what the bar does not cover. Says
 /// SKIPPED and gives no row where it is absent.
 std::vector<Row> recorded_traffic(const std::filesystem::path& data);
-/// The fixed-point tracker beside the same source in double, on the same detections of all scenarios.
+/// Every tracker in fixed point beside the same source in double, on the same detections of all scenarios.
 std::vector<Row> fixed_against_double();
 /// Simulated over elapsed time of `four-targets` on this machine, synthesis included.
 std::vector<Row> speed();

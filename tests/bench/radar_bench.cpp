@@ -10,6 +10,7 @@
 
 #include "tests/bench/accuracy_association.hpp"
 #include "tests/bench/accuracy_dsp.hpp"
+#include "tests/bench/accuracy_existence.hpp"
 #include "tests/bench/accuracy_sim.hpp"
 #include "tests/bench/row.hpp"
 #include "tests/bench/speed.hpp"
@@ -64,6 +65,7 @@ Measured accuracy(const std::string& part, const std::string& recordings, const 
     const auto wanted = [&part](const char* name) { return part == "all" || part == name; };
     if (wanted("dsp")) add(bench::accuracy_dsp());
     if (wanted("association")) add(bench::accuracy_association());
+    if (wanted("association")) add(bench::accuracy_existence());
     if (wanted("system")) add(bench::accuracy_sim(recordings));
     std::printf("%zu figures, %d bars missed\n", rows.size(), missed);
     return {missed == 0, json.empty() || write_json(json, rows)};
@@ -90,7 +92,8 @@ int main(int argc, char** argv) {
     std::string part = "all";
     accuracy_command
         ->add_option("--only", part,
-                     "dsp: signal processing; association: exact JPDA; system: scenarios and recordings")
+                     "dsp: signal processing; association: solvers against listing; system: scenarios "
+                     "and recordings")
         ->check(CLI::IsMember({"all", "dsp", "association", "system"}));
     std::string recordings = RADAR_RECORDINGS_DIR;
     accuracy_command

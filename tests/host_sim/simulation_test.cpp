@@ -10,25 +10,14 @@
 #include "can/messages.hpp"
 #include "host_sim/simulation.hpp"
 #include "host_sim/summary.hpp"
+#include "tests/host_sim/quiet_run.hpp"
 
 #include <CppUTest/TestHarness.h>
 
+using sim_test::quiet;
+using sim_test::simulate;
+
 namespace {
-
-sim::SimulationOptions quiet(const char* scenario, std::uint64_t frames) {
-    sim::SimulationOptions o;
-    o.scenario = sim::load_scenario(scenario);
-    o.frames = frames;
-    o.quiet = true;
-    return o;
-}
-
-sim::SimulationResult simulate(const sim::SimulationOptions& options) {
-    sim::Simulation simulation(options);
-    while (simulation.step()) {
-    }
-    return simulation.result();
-}
 
 std::string error_of(const sim::SimulationOptions& options) {
     try {

@@ -28,7 +28,14 @@ struct FrameRecord {
 };
 static_assert(sizeof(FrameRecord) == 12);
 
-enum ExitCode : std::uint32_t { ok = 0, no_input = 2, short_input = 3, cannot_write = 4, lost_frames = 5 };
+enum ExitCode : std::uint32_t {
+    ok = 0,
+    no_input = 2,
+    short_input = 3,
+    cannot_write = 4,
+    lost_frames = 5,
+    no_tracker = 6
+};
 
 /// Time passes only where somebody waits for it, as in the simulator that made the recording.
 class WaitingClock final : public hal::Clock {
@@ -117,8 +124,23 @@ File received = open_or_exit("bus.bin", 7, File::Mode::read);
 RecordedBeat beat(frames);
 
 const hal::Board board{beat, measured_port, timer, watchdog, console};
-constexpr firmware::RadarConfig kConfig = firmware::radar_config(dsp::kDefaultWaveform);
-firmware::Radar radar(kConfig, board);
+
+/// The radar's, but for the data association that tracker.txt names, if there is such a file.
+firmware::RadarConfig config_of_run() {
+    firmware::RadarConfig config = firmware::radar_config(dsp::kDefaultWaveform);
+    File file("tracker.txt", 11, File::Mode::read);
+    if (!file.is_open()) return config;
+    std::array<char, 16> text{};
+    std::size_t length = 0;
+    while (length < text.size() && file.read(&text[length], 1)) ++length;
+    const auto choice = tracking::associator_chosen({text.data(), length});
+    if (!choice) semihosting::exit(no_tracker);
+    config.tracker.associator = choice->associator;
+    if (choice->level) config.tracker.ijipda.level = *choice->level;
+    if (!config.valid()) semihosting::exit(no_tracker);
+    return config;
+}
+firmware::Radar radar(config_of_run(), board);
 
 void feed_bus() {
     std::uint32_t count = 0;

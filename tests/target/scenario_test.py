@@ -24,7 +24,7 @@ STATUS = 0x400  # first frame of every cycle that the radar sends
 FRAME_BYTES = 8192
 RECORD = struct.Struct("<HBB8s")
 MEMORY = struct.Struct("<4I")
-EXIT_CODES = {2: "frames.bin or bus.bin missing", 3: "bus.bin ended early", 4: "cannot write", 5: "CAN frames dropped",
+EXIT_CODES = {2: "frames.bin or bus.bin missing", 3: "bus.bin ended early", 4: "cannot write", 5: "CAN frames dropped", 6: "tracker.txt names no tracker of this image",
               emulator.TIMEOUT_EXIT_CODE: "not finished in time"}
 
 
@@ -87,11 +87,14 @@ def first_difference(expected, got):
     return None
 
 
-def replay(board, image, frames_path, cycles, seconds):
+def replay(board, image, frames_path, cycles, seconds, tracker=None):
     """Runs the image. Returns (sent cycles, instructions per cycle and stage, memory figures)."""
     with tempfile.TemporaryDirectory() as directory:
         os.link(frames_path, os.path.join(directory, "frames.bin"))
         write_bus(os.path.join(directory, "bus.bin"), cycles)
+        if tracker:
+            with open(os.path.join(directory, "tracker.txt"), "w") as out:
+                out.write(tracker)
         code, text = emulator.run(board, image, seconds, icount=0, directory=directory)
         if code != 0:
             sys.exit(f"{board}: the image ended with {code} ({EXIT_CODES.get(code, 'unknown')}) {text}")
@@ -109,6 +112,7 @@ def main():
     parser.add_argument("--image", required=True)
     parser.add_argument("--radar-sim", required=True)
     parser.add_argument("--scenario", required=True)
+    parser.add_argument("--tracker", help="as of radar_sim; the image must have it")
     parser.add_argument("--frames", type=int, help="at most this many")
     parser.add_argument("--seconds", type=float, default=280, help="give up after")
     parser.add_argument("--json", help="write the figures there")
@@ -121,6 +125,8 @@ def main():
         frames_path, log_path = os.path.join(directory, "frames.bin"), os.path.join(directory, "run.log")
         command = [os.path.abspath(arguments.radar_sim), "--scenario", arguments.scenario, "--record", frames_path,
                    "--log", log_path]
+        if arguments.tracker:
+            command += ["--tracker", arguments.tracker]
         if arguments.frames:
             command += ["--frames", str(arguments.frames)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -128,14 +134,15 @@ def main():
         recorded = os.path.getsize(frames_path) // FRAME_BYTES
         if recorded != len(cycles):
             sys.exit(f"{arguments.scenario}: {recorded} beat frames recorded, but {len(cycles)} cycles in the log")
-        sent, instructions, memory = replay(arguments.board, arguments.image, frames_path, cycles, arguments.seconds)
+        sent, instructions, memory = replay(arguments.board, arguments.image, frames_path, cycles, arguments.seconds,
+                                            arguments.tracker)
 
     expected = [frames for _, frames in cycles]
     difference = first_difference(expected, sent)
     totals = [sum(row) for row in instructions]
     columns = list(zip(*instructions))
     result = {
-        "board": arguments.board, "scenario": arguments.scenario, "frames": len(cycles),
+        "board": arguments.board, "scenario": arguments.scenario, "tracker": arguments.tracker, "frames": len(cycles),
         "can_frames": sum(len(c) for c in expected), "identical": difference is None,
         "instructions": {name: {"mean": round(sum(c) / len(c)), "worst": max(c)} for name, c in zip(STAGES, columns)},
         "loop": {"mean": round(sum(totals) / len(totals)), "worst": max(totals)}, **memory,
@@ -143,7 +150,7 @@ def main():
     if arguments.json:
         with open(arguments.json, "w") as out:
             json.dump(result, out, indent=1)
-    print(f"{arguments.board} {arguments.scenario}: {result['frames']} frames, {result['can_frames']} CAN frames, "
+    print(f"{arguments.board} {arguments.scenario} {arguments.tracker or ''}: {result['frames']} frames, {result['can_frames']} CAN frames, "
           f"{'identical' if difference is None else 'DIFFERENT'}; loop {result['loop']['mean']} instructions mean, "
           f"{result['loop']['worst']} worst; stack {memory['stack_used']} bytes")
     for name in STAGES:

@@ -8,6 +8,7 @@
 
 #include <Eigen/LU>
 
+#include "tests/tracking/imm_outliers.hpp"
 #include "tracking/imm_pdaf.hpp"
 
 #include <CppUTest/TestHarness.h>
@@ -82,30 +83,6 @@ void pencil_step(double tolerance) {
     DOUBLES_EQUAL(mu * .5917587 + (1 - mu) * .8192288 + mu * (1 - mu) * (x1 - x2) * (x1 - x2),
                   number(all.covariance(0, 0)), 2 * tolerance);
 }
-
-template <class S>
-void survives_outliers() {
-    const auto model = tracking::RadarModes<S>{}.model();
-    CHECK(model.valid());
-    std::mt19937 random(41);  // NOLINT
-    ImmState<S, 2, 2> s;
-    s.start({S(80), S(-5)}, tracking::Mat2<S>::Identity());
-    int unsound = 0;
-    for (int i = 0; i < 100'000; ++i) {
-        predict(s, model);
-        const Vec2<S> z(constant<S>(static_cast<int>(random() % 16000), 100),
-                        constant<S>(static_cast<int>(random() % 6000) - 3000, 100));
-        update(s, z, Vec2<S>(constant<S>(1, 10000), constant<S>(1, 10000)));
-        bool sound = std::abs(number(s.probability[0]) + number(s.probability[1]) - 1) < 1e-6;
-        for (std::size_t j = 0; j < 2; ++j) {
-            sound = sound && s.probability[j] > S(0) && s.probability[j] < S(1) &&
-                    tracking::is_finite(s.x[j][0]) && tracking::is_finite(s.x[j][1]) &&
-                    s.covariance[j](0, 0) > S(0) && s.covariance[j](1, 1) > S(0);
-        }
-        if (!sound) ++unsound;
-    }
-    LONGS_EQUAL(0, unsound);
-}
 }  // namespace
 
 TEST_GROUP(Imm){};
@@ -116,8 +93,8 @@ TEST(Imm, TwoModesWithAPencil) {
 }
 
 TEST(Imm, ModeProbabilitiesSurviveOutliers) {
-    survives_outliers<double>();
-    survives_outliers<Real>();
+    LONGS_EQUAL(0, tracking_test::unsound_imm_steps<double>(100'000));
+    LONGS_EQUAL(0, tracking_test::unsound_imm_steps<Real>(100'000));
 }
 
 TEST(Imm, ModesRecognised) {
