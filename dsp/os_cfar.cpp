@@ -262,9 +262,26 @@ std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell
     const auto take = [&](std::uint16_t x) { reference[count++] = x; };
     for_each_doppler_reference(map, config_, range_cell, doppler_cell, take);
     for_each_range_reference(map, config_, range_cell, doppler_cell, take);
-    const auto kth = reference.begin() + config_.rank - 1;
-    std::nth_element(reference.begin(), kth, reference.begin() + static_cast<std::ptrdiff_t>(count));
-    return std::max<std::int32_t>(*kth + noise_offset_, 0);
+    // Hoare's selection: parts the cells about a pivot until the pivot's place is the one asked for.
+    const auto wanted = static_cast<std::ptrdiff_t>(config_.rank - 1);
+    std::ptrdiff_t low = 0;
+    std::ptrdiff_t high = static_cast<std::ptrdiff_t>(count) - 1;
+    const auto at = [&reference](std::ptrdiff_t i) -> std::uint16_t& {
+        return reference[static_cast<std::size_t>(i)];
+    };
+    while (low < high) {
+        const std::uint16_t pivot = at(wanted);
+        std::ptrdiff_t i = low;
+        std::ptrdiff_t j = high;
+        while (i <= j) {
+            while (at(i) < pivot) ++i;
+            while (at(j) > pivot) --j;
+            if (i <= j) std::swap(at(i++), at(j--));
+        }
+        if (j < wanted) low = i;
+        if (wanted < i) high = j;
+    }
+    return std::max<std::int32_t>(at(wanted) + noise_offset_, 0);
 }
 
 void os_cfar(const PowerMap& map, const OsCfar& cfar, const CellMask& candidates, CellMask& hits) {

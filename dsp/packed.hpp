@@ -35,8 +35,9 @@ constexpr Pair both(std::uint16_t a) {
     return a | std::uint32_t{a} << 16;
 }
 /// Two neighbours in memory, the first in lane 0.
-inline Pair load(const std::uint16_t* at) {
-    static_assert(std::endian::native == std::endian::little);
+template <class T>
+Pair load(const T* at) {
+    static_assert(sizeof(T) == 2 && std::endian::native == std::endian::little);
     Pair pair = 0;
     std::memcpy(&pair, at, sizeof pair);
     return pair;
