@@ -48,9 +48,9 @@ std::uint16_t noise_level(const PowerMap& map, int first_range_cell) {
     constexpr int kBinBits = 8;
     std::array<std::uint16_t, 1 << (16 - kBinBits)> histogram{};
     for (std::size_t r = static_cast<std::size_t>(first_range_cell); r < kRangeCells; ++r) {
-        for (const std::uint16_t x : map.cell[r]) ++histogram[x >> kBinBits];
+        for (std::size_t d = r % 2; d < kDopplerCells; d += 2) ++histogram[map.cell[r][d] >> kBinBits];
     }
-    const int half = (kRangeCells - first_range_cell) * kDopplerCells / 2;
+    const int half = (kRangeCells - first_range_cell) * kDopplerCells / 4;
     int below = 0;
     std::size_t bin = 0;
     while (below + histogram[bin] < half) below += histogram[bin++];

@@ -28,11 +28,15 @@ constexpr Pair pack(std::int32_t lane_0, std::int32_t lane_1) {
     return (static_cast<std::uint32_t>(lane_0) & 0xFFFFU) | static_cast<std::uint32_t>(lane_1) << 16;
 }
 /// Two samples next to each other in memory; boards and PCs alike are little-endian.
-inline Pair load(const std::int16_t* samples) {
-    static_assert(std::endian::native == std::endian::little);
+template <class T>
+Pair load(const T* samples) {
+    static_assert(sizeof(T) == 2 && std::endian::native == std::endian::little);
     Pair pair;
     std::memcpy(&pair, samples, sizeof pair);
     return pair;
+}
+constexpr Pair both(std::uint16_t a) {
+    return a | std::uint32_t{a} << 16;
 }
 constexpr Pair swap(Pair a) {
     return a << 16 | a >> 16;
@@ -90,6 +94,9 @@ constexpr Pair pack_low(std::int32_t lane_0, std::int32_t lane_1) {
 }
 constexpr Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
     return pack(lane_0 >> 16, lane_1 >> 16);
+}
+constexpr Pair at_least(Pair a, Pair b) {
+    return ((a & 0xFFFFU) >= (b & 0xFFFFU) ? 1U : 0U) | (a >> 16 >= b >> 16 ? 0x10000U : 0U);
 }
 constexpr std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) + product(lane1(a), lane1(b)) + sum);
@@ -170,6 +177,11 @@ inline Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
     Pair result;
     asm("pkhtb %0, %1, %2, asr #16" : "=r"(result) : "r"(lane_1), "r"(lane_0));
     return result;
+}
+/// One in each lane where a >= b, both unsigned; else zero.
+inline Pair at_least(Pair a, Pair b) {
+    (void)__usub16(a, b);  // sets a flag for each byte that does not borrow
+    return __sel(0x00010001U, 0U);
 }
 /// sum + a0 b0 + a1 b1
 inline std::int32_t dot(Pair a, Pair b, std::int32_t sum) {

@@ -19,7 +19,7 @@ STAGES = {
     "range fft": [r"^dsp::tapered_fft64_real_pair\("],
     "doppler fft": [r"^dsp::tapered_fft64\("],
     "window and power": [r"^dsp::range_doppler\("],
-    "cfar": [r"^dsp::local_maxima\(", r"^dsp::os_cfar\("],
+    "cfar": [r"^dsp::cfar_peaks\("],
     "peaks": [r"^dsp::extract_peaks\("],
     "association": [r"^tracking::AssociationStatus tracking::associate<"],
     "filter": [r"^tracking::Tracker<.*>::step\("],
