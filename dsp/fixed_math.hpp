@@ -91,7 +91,7 @@ class Reciprocal {
     friend constexpr Fixed<F> operator*(Fixed<F> a, const Reciprocal& r) {
         if (r.mantissa_ == 0)
             return a.raw() > 0 ? Fixed<F>::max() : (a.raw() < 0 ? Fixed<F>::min() : Fixed<F>{});
-        return Fixed<F>::from_raw(saturate32(round_shift(product(a.raw(), r.mantissa_), r.shift_)));
+        return Fixed<F>::from_raw(saturate32(((product(a.raw(), r.mantissa_) >> (r.shift_ - 1)) + 1) >> 1));
     }
 
   private:
@@ -123,11 +123,14 @@ constexpr Fixed<F> exp(Fixed<F> x) {
     const std::int32_t t = detail::high_product(from_point << 1, kHalfLn2);
     const std::int32_t t2 = detail::high_product(t, t);
     const std::int32_t step = t + (t2 >> 1) + detail::high_product(detail::high_product(t2, t), kSixth);
-    const std::int64_t power = point + (static_cast<std::int64_t>(point) * step >> 32);  // 31 fraction bits
-    const int shift = 31 - F - n;
+    const std::uint32_t near_power = (point >> 1) + static_cast<std::uint32_t>(detail::high_product(
+                                                        static_cast<std::int32_t>(point >> 1), step));
+    const std::uint32_t power = near_power < 0x7FFF'FFFFU ? near_power : 0x7FFF'FFFFU;  // 30 fraction bits
+    const int shift = 30 - F - n;
     if (shift < 0) return Fixed<F>::max();
-    if (shift > 33) return Fixed<F>{};
-    return Fixed<F>::from_raw(saturate32(round_shift(power, shift)));
+    if (shift > 31) return Fixed<F>{};
+    if (shift == 0) return Fixed<F>::from_raw(static_cast<std::int32_t>(power));
+    return Fixed<F>::from_raw(static_cast<std::int32_t>(((power >> (shift - 1)) + 1) >> 1));
 }
 
 /// Natural logarithm within 1/2 LSB + 2^-26. ln of zero or a negative number is the most negative number.

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "tracking/association.hpp"
+#include "tracking/bits.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
@@ -88,12 +88,10 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
                 }
             }
             int cheapest = kNone;
-            for (std::uint64_t left = open & ~settled; left != 0; left &= left - 1) {
-                const int j = std::countr_zero(left);
-                if (cheapest == kNone || reached[static_cast<std::size_t>(j)].loss <
-                                             reached[static_cast<std::size_t>(cheapest)].loss)
-                    cheapest = j;
-            }
+            for_each_bit(open & ~settled, [&](std::uint32_t j) {
+                if (cheapest == kNone || reached[j].loss < reached[static_cast<std::size_t>(cheapest)].loss)
+                    cheapest = static_cast<int>(j);
+            });
             if (cheapest == kNone || loser_loss < reached[static_cast<std::size_t>(cheapest)].loss) break;
             loss = reached[static_cast<std::size_t>(cheapest)].loss;
             const int owner = out.owner[static_cast<std::size_t>(cheapest)];
@@ -107,12 +105,11 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
         const S end_loss = found == kNone ? loser_loss : loss;
 
         // The rows on the way accept less; what they compete for costs that much more.
-        for (std::uint64_t left = settled; left != 0; left &= left - 1) {
-            const auto j = static_cast<std::size_t>(std::countr_zero(left));
+        for_each_bit(settled, [&](std::uint32_t j) {
             const S raise = end_loss - reached[j].loss;
             out.measurement_price[j] += raise;
             out.row_price[static_cast<std::size_t>(out.owner[j])] -= raise;
-        }
+        });
         out.row_price[static_cast<std::size_t>(start)] -= end_loss;
 
         // Hand the measurements down the chain, from its end back to the new row.

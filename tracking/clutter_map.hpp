@@ -29,30 +29,37 @@ class ClutterMap {
 
     /// ln of the clutter density at z over the density expected everywhere, >= 0.
     [[nodiscard]] S log_excess(const Vec2<S>& z) const {
-        const S count = mean_[cell(z)];
-        return count > S(0) ? ln(S(S(1) + count * per_count_)) : S(0);
+        const std::uint16_t count = mean_[cell(z)];
+        return count > 0 ? ln(S(S(1) + scalar_from<S>(dsp::Fixed<kMeanBits>::from_raw(count)) * per_count_))
+                         : S(0);
     }
 
     /// A measurement turned out to be nobody's.
-    void add(const Vec2<S>& z) { mean_[cell(z)] += constant<S>(1, kMemory); }
+    void add(const Vec2<S>& z) {
+        constexpr std::uint16_t kOnce = (1 << kMeanBits) / kMemory;
+        std::uint16_t& mean = mean_[cell(z)];
+        mean = mean <= 0xFFFF - kOnce ? static_cast<std::uint16_t>(mean + kOnce) : std::uint16_t{0xFFFF};
+    }
 
-    /// Once a frame: forgets with a time constant of kMemory frames. One band a frame, so that it costs
-    /// kRates multiplications.
+    /// Once a frame: forgets with a time constant of kMemory frames. One band a frame. Rounds so that nothing
+    /// stays.
     void forget() {
+        constexpr int kShare = kMemory / kBands;
         for (std::size_t i = 0; i < kRates; ++i) {
-            S& mean = mean_[static_cast<std::size_t>(band_) * kRates + i];
-            if (mean > S(0)) mean -= mean * constant<S>(kBands, kMemory);
+            std::uint16_t& mean = mean_[static_cast<std::size_t>(band_) * kRates + i];
+            mean = static_cast<std::uint16_t>(mean - (mean + kShare - 1) / kShare);
         }
         band_ = (band_ + 1) % kBands;
     }
 
     void reset() {
-        mean_.fill(S(0));
+        mean_.fill(0);
         band_ = 0;
     }
 
   private:
     static constexpr int kMemory = 64;
+    static constexpr int kMeanBits = 12;  ///< of the fraction of a mean, which saturates at 16 a frame
 
     [[nodiscard]] std::size_t cell(const Vec2<S>& z) const {
         // Limited before the conversion: what is off the map, however far, counts at its edge.
@@ -67,8 +74,8 @@ class ClutterMap {
     S span_;
     S per_rate_;
     S per_count_;
-    std::array<S, std::size_t{kBands} * kRates> mean_{};
-    int band_ = 0;  // to be forgotten next
+    std::array<std::uint16_t, std::size_t{kBands} * kRates> mean_{};  ///< detections a frame
+    int band_ = 0;                                                    // to be forgotten next
 };
 
 }  // namespace tracking

@@ -92,6 +92,17 @@ class Gate {
         return {r[0] + obscured_variance_[0], r[1] + obscured_variance_[1]};
     }
 
+    /// How far in range rate a measurement of at most this variance can be from a track of variance p11 in
+    /// its gate.
+    [[nodiscard]] S rate_reach(S p11, S variance, bool obscured) const {
+        const S r = rate_variance(variance) + (obscured ? obscured_variance_[1] : S(0));
+        return sqrt_above(S(config_.gate * S(p11 + r)));
+    }
+    /// R of the range rate of a measurement of this variance.
+    [[nodiscard]] S rate_variance(S variance) const {
+        return variance > least_variance_[1] ? variance : least_variance_[1];
+    }
+
     /// ln of the likelihood ratio PD N(nu; 0, S) / lambda of a measurement inside the gate; nothing outside,
     /// or when S is singular.
     [[nodiscard]] bool test(const Vec2<S>& nu, const Mat2<S>& p, const Vec2<S>& r, S& distance2,

@@ -169,7 +169,6 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             detail::choose_optimally(read, dominants);
             break;
     }
-    const auto divisor = reciprocal(config.alpha);
     for (std::size_t t = 0; t < rows.size(); ++t) {
         AssociationRow<S>& row = rows[t];
         const bool has_dominant = dominants.candidate[t] != detail::kNobody;
@@ -181,7 +180,7 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             const bool claimed = owner != detail::kNobody && owner != static_cast<int>(t);
             if (i != dominants.candidate[t] && (claimed || config.reduced == Reduced::all_but_dominant)) {
                 if (config.reduction == Reduction::divide) {
-                    c.weight = c.beta * divisor;
+                    c.weight = c.beta * reciprocal(config.alpha);
                 } else if (claimed && config.reduction == Reduction::exclusive && has_dominant) {
                     c.weight = S(0);
                 } else if (claimed) {

@@ -104,7 +104,7 @@ constexpr S sqrt_above(S x) {
     } else {
         if (x.raw() <= 0) return S(0);
         const std::uint64_t square = static_cast<std::uint64_t>(x.raw()) << S::fraction_bits;
-        const int k = std::bit_width(square) / 2;
+        const int k = (64 - std::countl_zero(square)) / 2;
         const std::uint64_t sum = (std::uint64_t{1} << k) + (square >> k);
         return S::from_raw(dsp::saturate32(static_cast<std::int64_t>(sum / 2) + 2));
     }

@@ -13,12 +13,14 @@
 
 #include "tracking/association.hpp"
 #include "tracking/associator.hpp"
+#include "tracking/bits.hpp"
 #include "tracking/clutter_map.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/imm_pdaf.hpp"
 #include "tracking/kalman.hpp"
 #include "tracking/order_statistics.hpp"
 #include "tracking/pda.hpp"
+#include "tracking/rate_index.hpp"
 #include "tracking/scalar.hpp"
 #include "tracking/track.hpp"
 
@@ -107,7 +109,10 @@ class Tracker {
         : config_(config),
           gate_(config.gate),
           clutter_(config.gate.clutter_density, config.gate.rate_span_mps),
-          model_(config.modes.model()) {}
+          index_(config.gate.rate_span_mps),
+          model_(config.modes.model()) {
+        set_start_noise();
+    }
 
     /// One frame, one period after the last. Of more than kMaxMeasurements the first are used: give them
     /// strongest first.
@@ -132,7 +137,9 @@ class Tracker {
         config_ = config;
         gate_ = Gate<S>(config.gate);
         clutter_ = ClutterMap<S>(config.gate.clutter_density, config.gate.rate_span_mps);
+        index_ = RateIndex<S>(config.gate.rate_span_mps);
         model_ = config.modes.model();
+        set_start_noise();
         reset();
     }
 
@@ -155,6 +162,11 @@ class Tracker {
     };
     /// Frames between the two measurements of a start: 2, so that one miss does not delay it further.
     static constexpr int kStartFrames = 2;
+
+    void set_start_noise() {
+        Mat2<S> p = Mat2<S>::Zero();
+        for (Mat2<S>& noise : start_noise_) noise = p = predict_covariance(p, config_.motion);
+    }
 
     static constexpr std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
 
@@ -206,12 +218,14 @@ class Tracker {
     TrackerConfig<S> config_;
     Gate<S> gate_;
     ClutterMap<S> clutter_;
+    RateIndex<S> index_;  // of the frame's measurements, then of the pending ones, then of the tracks
     std::array<S, kMaxMeasurements> log_excess_{};  // of the frame's measurements
     std::array<Track<S>, kMaxTracks> track_{};
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
     AssociatorWorkspace<S> work_{};
     ImmModel<S, 2, 2> model_;
     std::array<ImmState<S, 2, 2>, kHasModes ? kMaxTracks : 0> modes_{};  // of track_, in the same order
+    std::array<Mat2<S>, kStartFrames> start_noise_;  // of the motion between the two measurements of a start
     std::array<Pending, kMaxMeasurements> pending_{};
     int count_ = 0;
     int pending_count_ = 0;
@@ -235,7 +249,10 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
             ++report.invalid_measurements;
         }
     }
+    index_.clear();
     for (std::size_t i = 0; i < measurements.size(); ++i) {
+        const bool use = (free & bit(i)) != 0;
+        index_.add(use ? measurements[i].z[1] : S(0), use ? measurements[i].variance[1] : S(0));
         log_excess_[i] = (free & bit(i)) != 0 ? clutter_.log_excess(measurements[i].z) : S(0);
     }
     predict();
@@ -291,13 +308,15 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         const Track<S>& t = track_[i];
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
+        const bool hidden = confirmed && obscured(t);
+        const S reach = gate_.rate_reach(t.covariance(1, 1), index_.largest_variance(), hidden);
+        const bool count_clutter = config_.gate.nonparametric;
+        gate_.fill(row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], reach), hidden,
+                   count_clutter ? std::span<const S>{} : std::span<const S>(log_excess_));
         S counted(0);
-        if (config_.gate.nonparametric) {
-            gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t));
+        if (count_clutter) {
             counted = gate_.log_counted_excess(row, t, measurements);
             for (Candidate<S>& c : row.candidates()) c.log_ratio -= counted;
-        } else {
-            gate_.fill(row, t.x, t.covariance, measurements, usable, confirmed && obscured(t), log_excess_);
         }
         report.gate_overflow += row.dropped;
         existence[rows] = t.existence;
@@ -393,8 +412,14 @@ bool Tracker<S>::best_start(const Pending& from, const Measurement<S>& to, S& di
     const S variance = from_noise[1] + to_noise[1] + speed_up * speed_up * static_cast<int>(from.age);
     if (product_exceeds(change, change, config_.gate.gate, variance)) return false;
 
-    Mat2<S> p = innovation_covariance(Mat2<S>(Mat2<S>::Zero()), from_noise);
-    for (int i = 0; i < from.age; ++i) p = predict_covariance(p, config_.motion);
+    // F^age diag(from_noise) F^age' and the noise of as many frames.
+    const S t = config_.motion.period_s * static_cast<int>(from.age);
+    Mat2<S> p = start_noise_[from.age - 1U];
+    const S cross = t * from_noise[1];
+    p(0, 0) += from_noise[0] + t * cross;
+    p(0, 1) += cross;
+    p(1, 0) += cross;
+    p(1, 1) += from_noise[1];
     const S span = config_.gate.rate_span_mps;
     const int folds = span > S(0) ? 1 : 0;
     bool found = false;
@@ -402,7 +427,7 @@ bool Tracker<S>::best_start(const Pending& from, const Measurement<S>& to, S& di
         Vec2<S> x(from.measurement.z[0] - config_.gate.alias_range_m * fold,
                   from.measurement.z[1] + span * fold);
         if (x[1] < config_.min_start_rate_mps || x[1] > config_.max_start_rate_mps) continue;
-        for (int i = 0; i < from.age; ++i) x = predict_state(x, config_.motion);
+        x[0] += t * x[1];
         S d2(0);
         S log_density(0);
         if (!gate_.test(gate_.innovation(x, to.z), p, to_noise, d2, log_density)) continue;
@@ -421,31 +446,34 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
                        TrackerReport& report) {
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
-    for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
-        const auto index = static_cast<std::size_t>(std::countr_zero(rest));
+    index_.clear();
+    for (const Pending& p : std::span(pending_).first(static_cast<std::size_t>(pending_count_)))
+        index_.add(p.measurement.z[1], p.measurement.variance[1]);
+    const S speed_up = config_.motion.acceleration_sigma_mps2 * config_.motion.period_s;
+    const S most_change = gate_.rate_variance(index_.largest_variance()) + speed_up * speed_up * kStartFrames;
+    for_each_bit(unclaimed, [&](std::uint32_t index) {
         const Measurement<S>& m = measurements[index];
         Track<S> best;
         S best_distance2(0);
         int partner = -1;
-        for (int i = 0; i < pending_count_; ++i) {
-            const auto from = static_cast<std::size_t>(i);
-            if ((used & bit(from)) != 0) continue;
+        const S reach = gate_.rate_reach(most_change, m.variance[1], false);
+        for_each_bit(index_.near(m.z[1], reach) & ~used, [&](std::uint32_t from) {
             Track<S> candidate;
             S distance2(0);
-            if (!best_start(pending_[from], m, distance2, candidate)) continue;
-            if (partner >= 0 && distance2 >= best_distance2) continue;
+            if (!best_start(pending_[from], m, distance2, candidate)) return;
+            if (partner >= 0 && distance2 >= best_distance2) return;
             best = candidate;
             best_distance2 = distance2;
-            partner = i;
-        }
-        if (partner < 0) continue;
+            partner = static_cast<int>(from);
+        });
+        if (partner < 0) return;
         const Vec2<S> nu = gate_.innovation(best.x, m.z);
         const Innovation<S> innovation(best.covariance, gate_.noise(m, false));
         const Vec2<S> move = innovation.move(nu);
         best.x[0] += move[0];
         best.x[1] += move[1];
         best.covariance = innovation.posterior();
-        if (!in_field(best) || !make_room_for_tentative(m.snr_db, report)) continue;
+        if (!in_field(best) || !make_room_for_tentative(m.snr_db, report)) return;
         used |= bit(static_cast<std::size_t>(partner));
         left &= ~bit(index);
         best.id = next_id();
@@ -458,7 +486,7 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         if constexpr (kHasModes) modes_[static_cast<std::size_t>(count_)].start(best.x, best.covariance);
         track_[static_cast<std::size_t>(count_++)] = best;
         ++report.initiated;
-    }
+    });
     remember(measurements, left, used);
 }
 
@@ -539,26 +567,28 @@ template <class S>
 void Tracker<S>::merge(TrackerReport& report) {
     constexpr std::uint8_t kCoasting = 3;  // misses in a row
     const Vec2<S> least = gate_.noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, false);
-    const auto near = [&](const Vec2<S>& d, const Mat2<S>& p, const Vec2<S>& r) {
-        const S limit = config_.merge_distance2;
-        if (product_exceeds(d[1], d[1], limit, S(p(1, 1) + r[1])) ||
-            product_exceeds(d[0], d[0], limit, S(p(0, 0) + r[0])))
+    const S limit = config_.merge_distance2;
+    const auto near = [&](const Track<S>& a, const Track<S>& b) {
+        const Vec2<S> d(a.x[0] - b.x[0], a.x[1] - b.x[1]);
+        if (product_exceeds(d[1], d[1], limit, S(a.covariance(1, 1) + least[1])) ||
+            product_exceeds(d[0], d[0], limit, S(a.covariance(0, 0) + least[0])))
             return false;
-        const Innovation<S> innovation(p, r);
-        return innovation.valid() && innovation.distance2(d) < limit;
+        const Innovation<S> accuracy(a.covariance, least);
+        return accuracy.valid() && accuracy.distance2(d) < limit;
     };
+    index_.clear();
+    for (const Track<S>& t : tracks()) index_.add(t.x[1], t.misses < kCoasting ? t.covariance(1, 1) : S(0));
+    const S reach = sqrt_above(S(limit * S(index_.largest_variance() + least[1])));
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& b = track_[i];
         bool same = false;
-        for (std::size_t j = 0; j < static_cast<std::size_t>(count_) && !same; ++j) {
+        for_each_bit(index_.near(b.x[1], reach) & ~bit(i), [&](std::uint32_t j) {
             const Track<S>& a = track_[j];
-            if (i == j || a.state == TrackState::free || a.misses >= kCoasting) continue;
+            if (same || a.state == TrackState::free || a.misses >= kCoasting) return;
             const bool yields =
                 a.is_confirmed() == b.is_confirmed() ? j < i || b.misses >= kCoasting : a.is_confirmed();
-            if (!yields) continue;
-            const Vec2<S> d(a.x[0] - b.x[0], a.x[1] - b.x[1]);
-            same = near(d, a.covariance, least);
-        }
+            same = yields && near(a, b);
+        });
         b.overlap = same ? static_cast<std::uint8_t>(b.overlap + 1) : std::uint8_t{0};
         if (b.overlap < config_.merge_frames) continue;
         b.state = TrackState::free;
