@@ -6,6 +6,7 @@
 
 #include "dsp/fixed_point.hpp"
 #include "dsp/packed.hpp"
+#include "dsp/unrolled.hpp"
 
 namespace dsp {
 
@@ -30,14 +31,12 @@ DcLevels dc_levels(const BeatFrame& frame) {
             std::int32_t sum = 0;
             Pair low = packed::load(chirp);
             Pair high = low;
-            for (std::size_t n = 0; n < kSamples; n += 8) {
-                for (std::size_t i = n; i < n + 8; i += 2) {
-                    const Pair samples = packed::load(chirp + i);
-                    sum = packed::dot(samples, packed::pack(1, 1), sum);
-                    low = packed::smallest(low, samples);
-                    high = packed::largest(high, samples);
-                }
-            }
+            unrolled<kSamples, 2, 4>([&](std::size_t n) {
+                const Pair samples = packed::load(chirp + n);
+                sum = packed::dot(samples, packed::pack(1, 1), sum);
+                low = packed::smallest(low, samples);
+                high = packed::largest(high, samples);
+            });
             levels.sum[k] = sum;
             const std::int32_t top = std::max(packed::lane0(high), packed::lane1(high));
             const std::int32_t bottom = std::min(packed::lane0(low), packed::lane1(low));
@@ -75,7 +74,7 @@ void remove_dc(std::span<const std::int16_t, kSamples> even, std::int32_t even_s
     };
     const std::int32_t even_offset = -offset(even_sum);
     const std::int32_t odd_offset = -offset(odd_sum);
-    for (std::size_t n = 0; n < kSamples; n += 2) {
+    unrolled<kSamples, 2, 2>([&](std::size_t n) {
         const Pair a = packed::load(&even[n]);
         const Pair b = packed::load(&odd[n]);
         const Pair w = packed::load(&window[n]);
@@ -85,7 +84,7 @@ void remove_dc(std::span<const std::int16_t, kSamples> even, std::int32_t even_s
                                              packed::scale_1(packed::multiply_10(b, gain, odd_offset), w));
         out[n] = std::bit_cast<Complex16>(first);
         out[n + 1] = std::bit_cast<Complex16>(second);
-    }
+    });
 }
 
 }  // namespace dsp

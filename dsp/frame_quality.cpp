@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "dsp/packed.hpp"
+#include "dsp/unrolled.hpp"
 
 namespace dsp {
 
@@ -18,15 +19,13 @@ FrameQuality inspect(const BeatFrame& frame, std::int16_t adc_full_scale) {
         const auto& chirp = frame.chirp[k];
         packed::Pair low = packed::load(chirp.data());
         packed::Pair high = low;
-        for (std::size_t n = 0; n < kSamples; n += 8) {
-            for (std::size_t i = n; i < n + 8; i += 2) {
-                const packed::Pair samples = packed::load(&chirp[i]);
-                low = packed::smallest(low, samples);
-                high = packed::largest(high, samples);
-                // Rotate, mix, multiply by 2^32 over the golden ratio: every bit reaches every other.
-                hash = (std::rotl(hash, 5) ^ samples) * 0x9E3779B1U;
-            }
-        }
+        unrolled<kSamples, 2, 4>([&](std::size_t n) {
+            const packed::Pair samples = packed::load(&chirp[n]);
+            low = packed::smallest(low, samples);
+            high = packed::largest(high, samples);
+            // Rotate, mix, multiply by 2^32 over the golden ratio: every bit reaches every other.
+            hash = (std::rotl(hash, 5) ^ samples) * 0x9E3779B1U;
+        });
         all_low = packed::smallest(all_low, low);
         all_high = packed::largest(all_high, high);
         if (std::max(packed::lane0(high), packed::lane1(high)) >= adc_full_scale ||

@@ -8,6 +8,7 @@
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
 #include "dsp/tapered_fft64.hpp"
+#include "dsp/unrolled.hpp"
 
 namespace dsp {
 
@@ -26,9 +27,7 @@ int guard_bits(const Window& window) {
 
 int magnitude_bits(std::span<const Complex16, kChirps> row) {
     Pair spreads = 0;
-    for (std::size_t k = 0; k < kChirps; k += 8) {
-        for (std::size_t i = k; i < k + 8; ++i) spreads |= packed::spread(std::bit_cast<Pair>(row[i]));
-    }
+    unrolled<kChirps, 1, 8>([&](std::size_t k) { spreads |= packed::spread(std::bit_cast<Pair>(row[k])); });
     return packed::magnitude_bits(spreads);
 }
 
@@ -36,7 +35,7 @@ int magnitude_bits(std::span<const Complex16, kChirps> row) {
 void taper(std::span<Complex16, kChirps> row, const Window& window, int down) {
     const int lift = 1 - down;  // of the product of which the upper 16 bits are taken
     const std::int32_t rounding = (1 << 15) >> lift;
-    for (std::size_t k = 0; k < kChirps; ++k) {
+    unrolled<kChirps, 1, 4>([&](std::size_t k) {
         const Pair x = std::bit_cast<Pair>(row[k]);
         const auto w = static_cast<Pair>(window[k]);
         const auto scale = [lift](std::int32_t v) {
@@ -45,7 +44,7 @@ void taper(std::span<Complex16, kChirps> row, const Window& window, int down) {
         const std::int32_t re = scale(packed::multiply_00(x, w, rounding));
         const std::int32_t im = scale(packed::multiply_10(x, w, rounding));
         row[k] = std::bit_cast<Complex16>(packed::pack_high(re, im));
-    }
+    });
 }
 
 /// The same for chirps of different exponents, value = row * 2^exponent: as many bits as the row's largest
@@ -111,14 +110,12 @@ void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell)
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
                std::span<std::uint16_t, kDopplerCells> power) {
     const std::int32_t scale = 2 * exponent * kLogOne;
-    for (std::size_t i = 0; i < kDopplerCells; i += 4) {
-        for (std::size_t d = i; d < i + 4; ++d) {
-            const Pair x = std::bit_cast<Pair>(row[d]);
-            const auto square = static_cast<std::uint32_t>(packed::dot(x, x, 0));  // at most 2^31
-            power[d] = static_cast<std::uint16_t>(
-                std::max<std::int32_t>(log2_coarse_q10(std::max<std::uint32_t>(square, 1)) + scale, 0));
-        }
-    }
+    unrolled<kDopplerCells, 1, 4>([&](std::size_t d) {
+        const Pair x = std::bit_cast<Pair>(row[d]);
+        const auto square = static_cast<std::uint32_t>(packed::dot(x, x, 0));  // at most 2^31
+        power[d] = static_cast<std::uint16_t>(
+            std::max<std::int32_t>(log2_coarse_q10(std::max<std::uint32_t>(square, 1)) + scale, 0));
+    });
 }
 
 void range_doppler(const BeatFrame& frame, WindowKind range_window, WindowKind doppler_window,

@@ -69,7 +69,7 @@ TEST(Packed, EveryCombinationOfEdges) {
     for (const int a0 : kEdges) {
         for (const int a1 : kEdges) {
             for (const int b0 : kEdges) {
-                for (const int b1 : kEdges) check(a0, a1, b0, b1, a0 * 65536 + b1);
+                for (const int b1 : kEdges) check(a0, a1, b0, b1, a0 * 65536 + (b1 & 0xFFFF));
             }
         }
     }
