@@ -1,11 +1,10 @@
 // The radar on the Arm MPS2 boards. UART0: console, 115200 baud. UART1: CAN as SLCAN text, 1 Mbaud. UART2:
 // beat frames, 1 Mbaud (see hal/common/beat_link.hpp).
 
-#include "firmware/radar.hpp"
-#include "firmware/service_console.hpp"
+#include "firmware/run_board.hpp"
 #include "hal/bare_metal/reset_record.hpp"
-#include "hal/bare_metal/startup.hpp"
 #include "hal/common/beat_input.hpp"
+#include "hal/common/receiving_clock.hpp"
 #include "hal/common/slcan.hpp"
 #include "hal/common/uart_console.hpp"
 #include "hal/mps2/system_control.hpp"
@@ -28,14 +27,15 @@ hal::RingMemory front_end_ring;  ///< where a front end's DMA would write
 
 Timer timer({}, {});
 Uart<Mmio<kUart0>, 64> console_uart({});
-Uart<Mmio<kUart1>, 256> can_uart({});
-Uart<Mmio<kUart2>, 512> beat_uart({});
+Uart<Mmio<kUart1>, 1024> can_uart({});
+Uart<Mmio<kUart2>, 2048> beat_uart({});
 hal::UartConsole console(console_uart);
 hal::SlcanPort can_port(can_uart);
 CmsdkWatchdog<Mmio<kWatchdog>> watchdog({});
 hal::BeatInput beat(front_end_ring, beat_uart, timer, kConfig.waveform.period_ms * 1000U);
+hal::ReceivingClock loop_clock(timer, beat, 10'000);  // of the 20 ms that its queue holds
 
-const hal::Board board{beat, can_port, timer, watchdog, console};
+const hal::Board board{beat, can_port, loop_clock, watchdog, console};
 firmware::Radar radar(kConfig, board);
 
 }  // namespace
@@ -64,19 +64,5 @@ int main() {
     for (const std::uint32_t irq : {kUart0RxIrq, kUart1RxIrq, kUart2RxIrq, kTimer0Irq})
         SystemControl::enable_irq(irq);
 
-    firmware::ServiceConsole service(radar, board);
-    const hal::MemoryUse memory = hal::memory_use();
-    service.banner({.name = RADAR_BOARD_NAME,
-                    .last_run_ended_by = hal::to_string(last.cause),
-                    .fault_pc = last.pc,
-                    .fault_status = last.status,
-                    .fault_address = last.address,
-                    .rom_bytes = memory.rom_bytes,
-                    .static_ram_bytes = memory.static_ram_bytes,
-                    .stack_bytes = memory.stack_bytes});
-    radar.start();
-    for (;;) {
-        radar.run_cycle();
-        service.poll(hal::memory_use().stack_used_bytes);
-    }
+    firmware::run_board(RADAR_BOARD_NAME, last, radar, board);
 }

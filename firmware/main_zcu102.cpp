@@ -1,10 +1,9 @@
 // The radar on the real-time processor of the ZCU102. UART0: console, 115200 baud. UART1: beat frames, 1
 // Mbaud (see hal/common/beat_link.hpp). CAN1, the controller with a transceiver on the board: 500 kbit/s.
 
-#include "firmware/radar.hpp"
-#include "firmware/service_console.hpp"
-#include "hal/bare_metal/startup.hpp"
+#include "firmware/run_board.hpp"
 #include "hal/common/beat_input.hpp"
+#include "hal/common/receiving_clock.hpp"
 #include "hal/common/uart_console.hpp"
 #include "hal/zcu102/can.hpp"
 #include "hal/zcu102/reset.hpp"
@@ -32,8 +31,9 @@ hal::UartConsole console(console_uart);
 CanController<Mmio<kCan1>, Timer> can_port({}, timer);
 SystemWatchdog<Mmio<kSwdt>, Mmio<kPmuGlobal>> watchdog({}, {});
 hal::BeatInput beat(front_end_ring, beat_uart, timer, kConfig.waveform.period_ms * 1000U);
+hal::ReceivingClock loop_clock(timer, beat, 400);  // of the 640 us that its FIFO holds
 
-const hal::Board board{beat, can_port, timer, watchdog, console};
+const hal::Board board{beat, can_port, loop_clock, watchdog, console};
 firmware::Radar radar(kConfig, board);
 
 }  // namespace
@@ -45,19 +45,5 @@ int main() {
     beat_uart.start(baud_rate(kReferenceHz, hal::kBeatLinkBaud));
     can_port.start();
 
-    firmware::ServiceConsole service(radar, board);
-    const hal::MemoryUse memory = hal::memory_use();
-    service.banner({.name = RADAR_BOARD_NAME,
-                    .last_run_ended_by = hal::to_string(last.cause),
-                    .fault_pc = last.pc,
-                    .fault_status = last.status,
-                    .fault_address = last.address,
-                    .rom_bytes = memory.rom_bytes,
-                    .static_ram_bytes = memory.static_ram_bytes,
-                    .stack_bytes = memory.stack_bytes});
-    radar.start();
-    for (;;) {
-        radar.run_cycle();
-        service.poll(hal::memory_use().stack_used_bytes);
-    }
+    firmware::run_board(RADAR_BOARD_NAME, last, radar, board);
 }

@@ -33,21 +33,21 @@ class BeatInput final : public BeatSource {
         if (period_end_us_ == 0 || period_end_us_ > now_us + period_us_) period_end_us_ = now_us;
         while (period_end_us_ <= now_us) period_end_us_ += period_us_;
         const std::uint64_t deadline_us = period_end_us_ - period_us_ / 20;
-        const std::uint32_t broken_before = broken();
+        const std::uint32_t broken_before = broken_;
+        bool taken = false;
         do {
-            receive();
-            if (ring_.take(frame, sequence) == RingResult::taken) return BeatResult::ok;
-            timer_.pause();
-        } while (timer_.now_us() < deadline_us);
-        return broken() != broken_before ? BeatResult::invalid : BeatResult::missing;
+            poll();
+            taken = ring_.take(frame, sequence) == RingResult::taken;
+            if (!taken) timer_.pause();
+        } while (!taken && timer_.now_us() < deadline_us);
+        broken_ = count_broken();
+        if (taken) return BeatResult::ok;
+        return broken_ != broken_before ? BeatResult::invalid : BeatResult::missing;
     }
 
-    [[nodiscard]] const RingCounters& ring_counters() const { return ring_.counters(); }
-    [[nodiscard]] const BeatLinkCounters& link_counters() const { return link_.counters(); }
-
-  private:
-    /// Empties the serial line as far as the next complete frame.
-    void receive() {
+    /// Empties the serial line as far as the next complete frame. To be called at least once every 64 bytes,
+    /// 0.6 ms, while frames may come in that way: see ReceivingClock.
+    void poll() {
         for (std::size_t i = 0; i < kBeatPacketBytes; ++i) {
             const int byte = input_.read();
             if (byte < 0) return;
@@ -57,7 +57,11 @@ class BeatInput final : public BeatSource {
         }
     }
 
-    [[nodiscard]] std::uint32_t broken() const {
+    [[nodiscard]] const RingCounters& ring_counters() const { return ring_.counters(); }
+    [[nodiscard]] const BeatLinkCounters& link_counters() const { return link_.counters(); }
+
+  private:
+    [[nodiscard]] std::uint32_t count_broken() const {
         return link_.counters().crc_errors + ring_.counters().torn + ring_.counters().stale + unstampable_;
     }
 
@@ -68,6 +72,7 @@ class BeatInput final : public BeatSource {
     std::uint32_t period_us_;
     std::uint64_t period_end_us_ = 0;
     std::uint32_t unstampable_ = 0;
+    std::uint32_t broken_ = 0;  ///< count_broken() as the last cycle left it
 };
 
 }  // namespace hal

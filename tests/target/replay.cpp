@@ -168,6 +168,7 @@ int main() {
     File sent = open_or_exit("sent.bin", 8, File::Mode::write);
     File counts = open_or_exit("instructions.bin", 16, File::Mode::write);
     bus.start(port);
+    target::calibrate_stages();
     radar.start();
     for (std::uint32_t cycle = 0;; ++cycle) {
         feed_bus();
@@ -175,7 +176,8 @@ int main() {
         const std::uint32_t excluded = beat.excluded();
         const std::uint32_t begin = instructions();
         const bool more = radar.run_cycle();
-        const std::uint32_t total = instructions() - begin - (beat.excluded() - excluded);
+        const std::uint32_t total =
+            instructions() - begin - (beat.excluded() - excluded) - target::take_wrapper_instructions();
         if (!more) break;
         instructions_of(Stage::can) = measured_port.spent_sending();
         std::uint32_t known = 0;

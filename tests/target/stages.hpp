@@ -36,4 +36,11 @@ inline std::uint32_t& instructions_of(Stage stage) {
     return stage_instructions[static_cast<std::size_t>(stage)];
 }
 
+/// Measures what the wrappers themselves take, which is left out of every stage from then on. Uses
+/// stage_instructions.
+void calibrate_stages();
+
+/// What the wrappers took since the last call: part of the whole, but of no stage.
+std::uint32_t take_wrapper_instructions();
+
 }  // namespace target

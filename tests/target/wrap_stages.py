@@ -44,6 +44,15 @@ __wrap_{name}:
     bx lr
 """
 
+# What a wrapper takes is measured with these.
+NOTHING = """
+    .global {name}
+    .type {name}, %function
+    .thumb_func
+{name}:
+    bx lr
+"""
+
 
 def main():
     parser = argparse.ArgumentParser()
@@ -66,6 +75,9 @@ def main():
                 sys.exit(f"wrap_stages.py: {len(matches)} functions called across object files match {pattern}")
             wrappers.append(WRAPPER.format(name=matches[0], stage=stage))
             options.append(f"-Wl,--wrap={matches[0]}")
+    wrappers.append(NOTHING.format(name="wrapped_nothing") + NOTHING.format(name="plain_nothing"))
+    wrappers.append(WRAPPER.format(name="wrapped_nothing", stage=len(STAGES) + 1))  # Stage::rest
+    options.append("-Wl,--wrap=wrapped_nothing")
     with open(arguments.output, "w") as output:
         output.write("    .syntax unified\n    .thumb\n    .text\n" + "".join(wrappers))
     with open(arguments.options, "w") as output:

@@ -15,7 +15,15 @@ namespace target {
 using hal::Mmio;
 using namespace hal::mps2;
 
-/// Instructions since start(), modulo 2^32: SysTick at 25 MHz under -icount shift=0, 40 instructions a tick.
+/// Lets instructions() count.
+inline void start_counting() {
+    SystemControl::write(scs_reg::kSystRvr, 0x00FF'FFFF);
+    SystemControl::write(scs_reg::kSystCvr, 0);
+    SystemControl::write(scs_reg::kSystCsr, scs_reg::kSystEnable | scs_reg::kSystProcessorClock);
+}
+
+/// Instructions since start_counting(), modulo 2^32: SysTick at 25 MHz under -icount shift=0, 40 instructions
+/// a tick.
 inline std::uint32_t instructions() {
     static std::uint32_t last = 0;
     static std::uint32_t ticks = 0;
@@ -72,9 +80,7 @@ class TestBus {
         return Port<Timer>(bus.line_);
     }
     void start(hal::SlcanPort<Line>& port) {
-        SystemControl::write(scs_reg::kSystRvr, 0x00FF'FFFF);
-        SystemControl::write(scs_reg::kSystCvr, 0);
-        SystemControl::write(scs_reg::kSystCsr, scs_reg::kSystEnable | scs_reg::kSystProcessorClock);
+        start_counting();
         line_.type("C\rS6\rO\r");
         can::Frame none;
         port.receive(none);
@@ -103,6 +109,7 @@ class TestBus {
 };
 
 inline Uart<Mmio<kUart0>, 64> uart({});
+inline hal::UartConsole uart_console(uart);
 inline void start_uart() {
     uart.start(115'200);
 }

@@ -16,7 +16,13 @@ namespace target {
 using hal::Mmio;
 using namespace hal::zcu102;
 
-/// Instructions since start(), modulo 2^32: the cycle counter, under -icount shift=0.
+/// Lets instructions() count: the cycle counter on, from zero, not divided.
+inline void start_counting() {
+    asm volatile("mcr p15, 0, %0, c9, c12, 0" ::"r"(1U | 1U << 2));
+    asm volatile("mcr p15, 0, %0, c9, c12, 1" ::"r"(1U << 31));
+}
+
+/// Instructions since start_counting(), modulo 2^32: the cycle counter, under -icount shift=0.
 inline std::uint32_t instructions() {
     std::uint32_t count = 0;
     asm volatile("mrc p15, 0, %0, c9, c13, 0" : "=r"(count)::"memory");
@@ -79,9 +85,7 @@ class TestBus {
     }
     template <class Timer>
     void start(Port<Timer>& port) {
-        // The cycle counter: on, from zero, not divided.
-        asm volatile("mcr p15, 0, %0, c9, c12, 0" ::"r"(1U | 1U << 2));
-        asm volatile("mcr p15, 0, %0, c9, c12, 1" ::"r"(1U << 31));
+        start_counting();
         car_.start();
         port.start();
     }
@@ -93,6 +97,7 @@ class TestBus {
 };
 
 inline Uart<Mmio<kUart0>> uart({});
+inline hal::UartConsole uart_console(uart);
 inline void start_uart() {
     uart.start(baud_rate(kReferenceHz, 115'200));
 }
