@@ -29,14 +29,15 @@ struct DspConfig {
 };
 static_assert(DspConfig{}.valid());
 
-/// All memory the signal processing needs besides the frame, about 13 KiB. `map`, `spectrum` and `peaks` are
+/// All memory the signal processing needs besides the frame, about 13 KiB. All but `candidates` are
 /// those of the frame after detect().
 struct Workspace {
     Spectrum spectrum;
     PowerMap map;
     CellMask peaks;
     CandidateList candidates;
-    OsCfar cfar{CfarConfig{}};  ///< rebuilt when the configuration changes
+    std::uint16_t noise_level = 0;  ///< see noise_level()
+    OsCfar cfar{CfarConfig{}};      ///< rebuilt when the configuration changes
 };
 static_assert(sizeof(Workspace) <= 14 * 1024);
 

@@ -7,6 +7,7 @@
 
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
+#include "dsp/packed.hpp"
 #include "dsp/window_response.hpp"
 
 namespace dsp {
@@ -54,95 +55,123 @@ int collect(const PowerMap& map, const CellMask& peaks, CandidateList& list, int
     return static_cast<int>(end - list.begin());
 }
 
+/// Five neighbouring cells along an axis, and a zero.
+using Taps = std::array<std::int16_t, kTaps + 1>;
+
+/// sum_i w_i s_i, Q12 times the cells' unit.
+std::int32_t weigh(const Taps& cells, const WindowResponse::Weights& weights) {
+    static_assert(kTaps == 5);
+    std::int32_t sum = packed::dot(packed::load(&cells[0]), packed::load(&weights[0]), 0);
+    sum = packed::dot(packed::load(&cells[2]), packed::load(&weights[2]), sum);
+    return packed::dot(packed::load(&cells[4]), packed::load(&weights[4]), sum);
+}
+
 /// The cells around a peak with the peak's phase and the lobe's alternating sign taken off: a lone target is
-/// real and positive there, the peak cell about 2^kUnitBits.
+/// real and positive there, the peak cell at least 2^13 and below 2^14, rounded down to one. What is more
+/// than twice that saturates; it is another target's. Mirrored along an axis where the target lies on the
+/// lower side of the peak cell, so that offsets are positive.
 struct Patch {
-    static constexpr int kUnitBits = 20;
-    std::array<std::array<std::int32_t, kTaps>, kTaps> cell;  ///< [range][Doppler]
-    std::int32_t unit;                                        ///< the peak cell exactly
+    static constexpr int kUnitBits = 14;
+    alignas(4) std::array<Taps, kTaps> along_doppler{};  ///< [range cell]
+    alignas(4) std::array<Taps, kTaps> along_range{};    ///< [Doppler cell], the same cells
+    std::int32_t log2_unit = 0;                          ///< of the peak cell, Q6.10
 };
 
-Patch align(const Spectrum& spectrum, const Cell& peak) {
+Patch align(const Spectrum& spectrum, const Cell& peak, bool mirror_range, bool mirror_doppler) {
     const auto peak_row = static_cast<std::size_t>(peak.range);
     const Complex16 top = spectrum.row[peak_row][static_cast<std::size_t>(peak.doppler)];
-    const std::int64_t power = std::int64_t{top.re} * top.re + std::int64_t{top.im} * top.im;
-    const int down = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(power))) - Patch::kUnitBits;
-    const auto scale = [](std::int64_t v, int shift) {
-        return saturate32(shift >= 0 ? round_shift(v, shift) : v * (std::int64_t{1} << std::min(-shift, 30)));
-    };
-    Patch patch{};
-    patch.unit = scale(power, down);
+    // One step less at the very end of the format, so that no sum of two products overflows.
+    const auto inside = [](std::int16_t v) { return std::max<std::int32_t>(v, -32767); };
+    const std::int32_t re = inside(top.re);
+    const std::int32_t im = inside(top.im);
+    const auto power = static_cast<std::uint32_t>(re * re + im * im);
+    const int down = static_cast<int>(std::bit_width(power)) - Patch::kUnitBits;
+    Patch patch;
+    patch.log2_unit = log2_q10(power) - down * kLogOne;
+    const int range_step = mirror_range ? -1 : 1;
+    const int doppler_step = mirror_doppler ? -1 : 1;
     for (int i = 0; i < kTaps; ++i) {
-        const int range = peak.range + i - kReach;
+        const int range = peak.range + range_step * (i - kReach);
         // A real signal's spectrum below cell 0: X[-r, -d] = conj X[r, d]. Above the last row it is not kept.
-        const bool mirrored = range < 0;
+        const bool below = range < 0;
         if (range >= kRangeCells) continue;
-        const auto row = static_cast<std::size_t>(mirrored ? -range : range);
+        const auto row = static_cast<std::size_t>(below ? -range : range);
         const int row_down = down + spectrum.row_exponent[peak_row] - spectrum.row_exponent[row];
-        for (int j = 0; j < kTaps; ++j) {
-            const int doppler = peak.doppler + j - kReach;
-            const Complex16 x =
-                spectrum
-                    .row[row][static_cast<std::size_t>(mirrored ? -doppler : doppler) & (kDopplerCells - 1)];
-            const std::int64_t aligned =
-                std::int64_t{x.re} * top.re + std::int64_t{x.im} * (mirrored ? -top.im : top.im);
-            patch.cell[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
-                scale(((i + j) & 1) != 0 ? -aligned : aligned, row_down);
-        }
+        if (row_down > 30) continue;
+        const packed::Pair turn = packed::pack(re, below ? -im : im);
+        const packed::Pair turn_and_change_sign = packed::pack(-re, below ? im : -im);
+        const std::array<packed::Pair, 2> turns =
+            i % 2 == 0 ? std::array{turn, turn_and_change_sign} : std::array{turn_and_change_sign, turn};
+        const Complex16* cells = spectrum.row[row].data();
+        const int first =
+            below ? -peak.doppler + doppler_step * kReach : peak.doppler - doppler_step * kReach;
+        const int step = below ? -doppler_step : doppler_step;
+        const auto place = [&](std::size_t j) {
+            const auto column = static_cast<std::size_t>(first + step * static_cast<int>(j));
+            const Complex16 x = cells[column & (kDopplerCells - 1)];
+            std::int32_t v = packed::dot(packed::pack(x.re, x.im), turns[j % 2], 0);
+            if (row_down >= 0) {
+                v >>= row_down;
+            } else {  // a row with another, far stronger target
+                const int up = std::min(-row_down, 15);
+                v = std::clamp<std::int32_t>(v, -(32768 >> up), 32767 >> up) * (1 << up);
+            }
+            patch.along_doppler[static_cast<std::size_t>(i)][j] = saturate16(v);
+            patch.along_range[j][static_cast<std::size_t>(i)] = saturate16(v);
+        };
+        for (std::size_t j = 0; j < kTaps; ++j) place(j);
     }
     return patch;
 }
 
-/// A WindowResponse's weights for a guess of either sign.
+/// A WindowResponse's weights for a guess of the offset.
 class Guess {
   public:
     Guess(const WindowResponse& response, std::int32_t offset_q15)
-        : response_(response), mirrored_(offset_q15 < 0) {
-        const std::int32_t steps = round_shift(std::abs(offset_q15) * WindowResponse::kGridPerCell, 15);
-        index_ = std::min<std::int32_t>(steps, WindowResponse::kGrid - 1);
+        : response_(response),
+          index_(std::clamp<std::int32_t>(
+              (offset_q15 + kStepQ15 / 2) >> (15 - std::countr_zero(unsigned{WindowResponse::kGridPerCell})),
+              0, WindowResponse::kGrid - 1)) {}
+
+    [[nodiscard]] std::int32_t amplitude(const Taps& taps) const {
+        return weigh(taps, response_.amplitude[index()]);
     }
-    [[nodiscard]] std::int32_t amplitude(int tap) const { return response_.amplitude[index()][at(tap)]; }
-    [[nodiscard]] std::int32_t offset(int tap) const {
-        const std::int32_t weight = response_.offset[index()][at(tap)];
-        return mirrored_ ? -weight : weight;
+    /// Guess plus sum g s / A, the quotient within 2^-15, at most kFarthestQ15 either way. `amplitude`: A.
+    [[nodiscard]] std::int32_t refined_q15(const Taps& taps, std::int32_t amplitude) const {
+        if (amplitude <= 0) return 0;
+        const std::int32_t offset = weigh(taps, response_.offset[index()]);
+        std::int32_t step = 1 << 15;
+        if (offset <= -amplitude) {
+            step = -step;
+        } else if (offset < amplitude) {
+            const int up = std::countl_zero(static_cast<std::uint32_t>(amplitude)) - 1;
+            step = (offset * (1 << up)) / (amplitude * (1 << up) >> 15);
+        }
+        return std::clamp(index_ * kStepQ15 + step, -kFarthestQ15, kFarthestQ15);
     }
-    [[nodiscard]] std::int32_t value_q15() const {
-        const std::int32_t value = index_ * ((1 << 15) / WindowResponse::kGridPerCell);
-        return mirrored_ ? -value : value;
+    [[nodiscard]] std::int32_t refined_q15(const Taps& taps) const {
+        return refined_q15(taps, amplitude(taps));
+    }
+    /// The amplitudes of five lines of cells.
+    [[nodiscard]] Taps profile(const std::array<Taps, kTaps>& lines) const {
+        Taps out{};
+        constexpr int kBits = WindowResponse::kWeightBits;
+        for (std::size_t i = 0; i < kTaps; ++i) {
+            out[i] = saturate16((amplitude(lines[i]) + (1 << (kBits - 1))) >> kBits);
+        }
+        return out;
     }
     [[nodiscard]] std::uint32_t amplitude_variance() const { return response_.amplitude_variance[index()]; }
     [[nodiscard]] std::uint32_t offset_variance() const { return response_.offset_variance[index()]; }
 
   private:
+    static constexpr std::int32_t kStepQ15 = (1 << 15) / WindowResponse::kGridPerCell;
+    /// A peak of one target lies within half a cell of the largest cell; noise moves it a little further.
+    static constexpr std::int32_t kFarthestQ15 = (3 << 15) / 4;
     [[nodiscard]] std::size_t index() const { return static_cast<std::size_t>(index_); }
-    [[nodiscard]] std::size_t at(int tap) const {
-        return static_cast<std::size_t>(mirrored_ ? kTaps - 1 - tap : tap);
-    }
     const WindowResponse& response_;
-    bool mirrored_;
     std::int32_t index_;
 };
-
-/// Weighted sums of a patch: across one axis with the amplitude weights of `across`, then along the other.
-struct Sums {
-    std::int64_t offset = 0;
-    std::int64_t amplitude = 0;
-};
-
-template <class At>
-Sums weigh(const Guess& along, const Guess& across, At cell) {
-    Sums sums;
-    for (int i = 0; i < kTaps; ++i) {
-        std::int64_t profile = 0;
-        for (int j = 0; j < kTaps; ++j) profile += std::int64_t{across.amplitude(j)} * cell(i, j);
-        profile = round_shift(profile, WindowResponse::kWeightBits);
-        sums.offset += profile * along.offset(i);
-        sums.amplitude += profile * along.amplitude(i);
-    }
-    sums.amplitude = round_shift(sums.amplitude, WindowResponse::kWeightBits);
-    sums.offset = round_shift(sums.offset, WindowResponse::kWeightBits);
-    return sums;
-}
 
 /// Place and quality of a peak between the cells.
 struct Place {
@@ -151,16 +180,6 @@ struct Place {
     std::int32_t range_variance = 0;  ///< log2 of cells^2 for a peak cell at the level of the noise, Q6.10
     std::int32_t doppler_variance = 0;
 };
-
-/// A peak of one target lies within half a cell of the largest cell; noise moves it a little further.
-constexpr std::int32_t kFarthestQ15 = (3 << 15) / 4;
-
-std::int32_t refine(const Guess& guess, const Sums& sums) {
-    if (sums.amplitude <= 0) return 0;
-    const std::int64_t step = round_divide<std::int64_t>(sums.offset * (1 << 15), sums.amplitude);
-    return static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(guess.value_q15() + step, -kFarthestQ15, kFarthestQ15));
-}
 
 /// The offset at which the cell below the peak has this much of its power, log2 Q6.10.
 std::int32_t offset_from_below(const WindowResponse& response, std::int32_t ratio) {
@@ -175,49 +194,60 @@ std::int32_t offset_from_below(const WindowResponse& response, std::int32_t rati
 
 Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
              const WindowResponse& range_response, const WindowResponse& doppler_response) {
-    const Patch patch = align(spectrum, peak);
-    const auto along_range = [&patch](int i, int j) {
-        return patch.cell[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-    };
-    const auto along_doppler = [&patch](int i, int j) {
-        return patch.cell[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)];
-    };
     const bool has_range_above = peak.range + kReach < kRangeCells;
     Place place;
-    if (!has_range_above) {
+    bool mirror_range = false;
+    if (has_range_above) {
+        mirror_range =
+            peak.range > 0 && map.at(peak.range - 1, peak.doppler) > map.at(peak.range + 1, peak.doppler);
+    } else {
         const std::int32_t below = map.at(peak.range - 1, peak.doppler);
         place.range_q15 = offset_from_below(range_response, below - peak.power);
+        mirror_range = place.range_q15 < 0;
+        if (mirror_range) place.range_q15 = -place.range_q15;
     }
+    const bool mirror_doppler = map.at(peak.range, peak.doppler - 1) > map.at(peak.range, peak.doppler + 1);
+    const Patch patch = align(spectrum, peak, mirror_range, mirror_doppler);
     // Each round's error is the square of the one before; the grid limits it to 1/32 cell from the second on.
-    constexpr int kRounds = 3;
-    std::int64_t amplitude = 0;
-    for (int round = 0; round < kRounds; ++round) {
-        const Guess range(range_response, place.range_q15);
-        const Guess doppler(doppler_response, place.doppler_q15);
-        const Sums sums = weigh(doppler, range, along_doppler);
-        amplitude = sums.amplitude;
-        place.doppler_q15 = refine(doppler, sums);
-        if (has_range_above) place.range_q15 = refine(range, weigh(range, doppler, along_range));
+    // The first rounds only choose the weights of the last one: the axes through the peak suffice.
+    for (int round = 0; round < 2; ++round) {
+        place.doppler_q15 =
+            Guess(doppler_response, place.doppler_q15).refined_q15(patch.along_doppler[kReach]);
+        if (has_range_above) {
+            place.range_q15 = Guess(range_response, place.range_q15).refined_q15(patch.along_range[kReach]);
+        }
     }
-    // Noise adds (g'Cg)(a'Ca) / 2A^2 to the offset, A the lobe's amplitude and not that of the peak cell.
     const Guess range(range_response, place.range_q15);
     const Guess doppler(doppler_response, place.doppler_q15);
-    const auto log2 = [](std::int64_t v) {
-        return log2_q10(static_cast<std::uint32_t>(std::clamp<std::int64_t>(v, 1, 1LL << 31)));
-    };
+    const Taps doppler_profile = range.profile(patch.along_range);
+    const std::int32_t peak_amplitude = doppler.amplitude(doppler_profile);
+    place.doppler_q15 = doppler.refined_q15(doppler_profile, peak_amplitude);
+    if (has_range_above) place.range_q15 = range.refined_q15(doppler.profile(patch.along_doppler));
+    if (mirror_range) place.range_q15 = -place.range_q15;
+    if (mirror_doppler) place.doppler_q15 = -place.doppler_q15;
+    // Noise adds (g'Cg)(a'Ca) / 2A^2 to the offset, A the lobe's amplitude and not that of the peak cell.
+    const auto log2 = [](std::uint32_t v) { return log2_q10(std::max<std::uint32_t>(v, 1)); };
+    const std::int32_t amplitude =
+        log2(static_cast<std::uint32_t>(std::max(peak_amplitude, std::int32_t{1}))) -
+        WindowResponse::kWeightBits * kLogOne;
     const std::int32_t lobe =
-        2 * (log2(patch.unit) - log2(amplitude)) - (2 * WindowResponse::kWeightBits + 1) * kLogOne;
+        2 * (patch.log2_unit - amplitude) - (2 * WindowResponse::kWeightBits + 1) * kLogOne;
     place.range_variance = lobe + log2(range.offset_variance()) + log2(doppler.amplitude_variance());
     place.doppler_variance = lobe + log2(doppler.offset_variance()) + log2(range.amplitude_variance());
     if (!has_range_above) place.range_variance += 3 * kLogOne;  // one cell of the four, and a table's step
     return place;
 }
 
-/// A standard deviation of 1/n cells that is there without noise, and the noise's part, as cells^2.
-Real variance_cells(std::int32_t log2_variance, Real model_error) {
+/// Variance from noise, cells^2.
+Real noise_cells(std::int32_t log2_variance) {
     const std::uint32_t noise = exp2_q30(std::min<std::int32_t>(log2_variance, 0));
-    return Real::from_raw(static_cast<std::int32_t>(noise >> (30 - Real::fraction_bits))) +
-           model_error * model_error;
+    return Real::from_raw(static_cast<std::int32_t>(noise >> (30 - Real::fraction_bits)));
+}
+
+/// log2 of power, Q6.10, in decibels: 10 log10(2) / 2^10 each.
+Real decibels(std::int32_t log2_power) {
+    constexpr std::int64_t kStepQ32 = 12'929'139'865;  // 10 log10(2) 2^22 / 2^10 with 20 more bits
+    return Real::from_raw(static_cast<std::int32_t>(round_shift(log2_power * kStepQ32, 20)));
 }
 
 }  // namespace
@@ -239,6 +269,14 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
                doppler_response.sidelobe[fold(doppler_distance)];
     };
     const Real model_error = Real::ratio(config.model_error_mcell, 1000);
+    const Real model_variance = model_error * model_error;
+    const Real range_cell2 = scale.range_cell_m * scale.range_cell_m;
+    const Real rate_cell2 = scale.rate_cell_mps * scale.rate_cell_mps;
+    const Real coupling2 = scale.coupling_s * scale.coupling_s;
+    // Candidates are no neighbours, so a sidelobe is at most this (the mirrored spectrum begins at cell 2).
+    const std::int32_t strongest_sidelobe =
+        std::max(std::max<std::int32_t>(range_response.sidelobe[2], doppler_response.sidelobe[2]) + margin,
+                 -dynamic_range);
 
     detections.count = 0;
     detections.dropped = 0;
@@ -249,6 +287,8 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
         bool sidelobe = false;
         for (int t = 0; t < targets && !sidelobe; ++t) {
             const Cell target = unpack(scratch[static_cast<std::size_t>(t)]);
+            // The rest is weaker still.
+            if (peak.power >= target.power + strongest_sidelobe && peak.range >= 2) break;
             const std::int32_t sidelobes =
                 std::max(response_to(target.range - peak.range, target.doppler - peak.doppler),
                          // A real signal's other half: the spectrum at -range, -Doppler.
@@ -274,12 +314,12 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
         detection.range_rate_mps = scale.rate_cell_mps * Real::from_raw(doppler_q15 * kToReal);
         detection.range_m = scale.range_cell_m * Real::from_raw(range_q15 * kToReal) + scale.range_offset_m -
                             scale.coupling_s * detection.range_rate_mps;
-        detection.rate_variance_m2ps2 = scale.rate_cell_mps * scale.rate_cell_mps *
-                                        variance_cells(place.doppler_variance - snr, model_error);
-        detection.range_variance_m2 = scale.range_cell_m * scale.range_cell_m *
-                                          variance_cells(place.range_variance - snr, model_error) +
-                                      scale.coupling_s * scale.coupling_s * detection.rate_variance_m2ps2;
-        detection.snr_db = Real::ratio(snr * std::int64_t{301'030}, std::int64_t{100'000} * kLogOne);
+        detection.rate_variance_m2ps2 =
+            rate_cell2 * (noise_cells(place.doppler_variance - snr) + model_variance);
+        detection.range_variance_m2 =
+            range_cell2 * (noise_cells(place.range_variance - snr) + model_variance) +
+            coupling2 * detection.rate_variance_m2ps2;
+        detection.snr_db = decibels(snr);
         detection.range_cell = static_cast<std::uint8_t>(peak.range);
         detection.doppler_cell = static_cast<std::uint8_t>(peak.doppler);
     }

@@ -8,7 +8,7 @@
 namespace dsp {
 
 /// Re and im next to each other, as packed 16-bit arithmetic wants them.
-struct Complex16 {
+struct alignas(4) Complex16 {
     std::int16_t re = 0;
     std::int16_t im = 0;
     bool operator==(const Complex16&) const = default;

@@ -9,6 +9,7 @@
 #include <concepts>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 namespace dsp {
 
@@ -26,6 +27,55 @@ constexpr std::int16_t saturate16(std::int32_t v) {
     return static_cast<std::int16_t>(v > kMax ? kMax : (v < kMin ? kMin : v));
 }
 
+// On the targets one instruction each, with the same bits as the plain C++ beside it; every scenario replayed
+// on a board against the PC compares them.
+
+/// a b. The compiler, left alone, remembers where a number comes from and multiplies it as one of 64 bits.
+constexpr std::int64_t product(std::int32_t a, std::int32_t b) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        std::int64_t out = 0;
+        asm("smull %Q0, %R0, %1, %2" : "=r"(out) : "r"(a), "r"(b));
+        return out;
+    }
+#endif
+    return static_cast<std::int64_t>(a) * b;
+}
+
+/// sum + a b, modulo 2^64.
+constexpr std::int64_t accumulated(std::int64_t sum, std::int32_t a, std::int32_t b) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        asm("smlal %Q0, %R0, %1, %2" : "+r"(sum) : "r"(a), "r"(b));
+        return sum;
+    }
+#endif
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(sum) +
+                                     static_cast<std::uint64_t>(static_cast<std::int64_t>(a) * b));
+}
+
+/// a + b and a - b, saturated.
+constexpr std::int32_t saturated_sum(std::int32_t a, std::int32_t b) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        std::int32_t out = 0;
+        asm("qadd %0, %1, %2" : "=r"(out) : "r"(a), "r"(b));
+        return out;
+    }
+#endif
+    return saturate32(static_cast<std::int64_t>(a) + b);
+}
+constexpr std::int32_t saturated_difference(std::int32_t a, std::int32_t b) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        std::int32_t out = 0;
+        asm("qsub %0, %1, %2" : "=r"(out) : "r"(a), "r"(b));
+        return out;
+    }
+#endif
+    return saturate32(static_cast<std::int64_t>(a) - b);
+}
+
 /// v / 2^bits, rounded half to even; 0 <= bits < width of Int. Exact for bits = 0. Cannot overflow: the
 /// rounding bit is added after the shift.
 template <std::signed_integral Int>
@@ -34,8 +84,20 @@ constexpr Int round_shift(Int v, int bits) {
     const Int floor = v >> bits;
     const Int half = Int{1} << (bits - 1);
     const Int rest = v & static_cast<Int>((half - 1) | half);
-    const bool up = rest > half || (rest == half && (floor & 1) != 0);
-    return static_cast<Int>(floor + (up ? 1 : 0));
+    return static_cast<Int>(floor + (rest > half - (floor & 1) ? 1 : 0));
+}
+
+/// v / 2^Bits, rounded half to even and saturated to 32 bits, 1 <= Bits <= 31 and |v| <= 2^62: what a product
+/// of two numbers of 32 bits becomes. Without a branch but for saturation.
+template <int Bits>
+constexpr std::int32_t narrowed(std::int64_t v) {
+    static_assert(Bits >= 1 && Bits <= 31);
+    const auto up = static_cast<std::uint64_t>(v) + (std::uint64_t{1} << (Bits - 1));
+    const auto high = static_cast<std::int32_t>(up >> 32);
+    auto out = static_cast<std::int32_t>(static_cast<std::uint32_t>(up >> Bits));
+    if (high >> (Bits - 1) != out >> 31) return (high >> 31) ^ std::numeric_limits<std::int32_t>::max();
+    if (static_cast<std::uint32_t>(up) << (32 - Bits) == 0) out &= ~1;  // a tie went up
+    return out;
 }
 
 /// num / den rounded half to even, den > 0. The quotient must fit Int.
@@ -101,14 +163,12 @@ class Fixed {
     constexpr auto operator<=>(const Fixed&) const = default;
 
     constexpr Fixed operator-() const { return from_raw(saturate32(-static_cast<std::int64_t>(raw_))); }
-    friend constexpr Fixed operator+(Fixed a, Fixed b) {
-        return from_raw(saturate32(static_cast<std::int64_t>(a.raw_) + b.raw_));
-    }
+    friend constexpr Fixed operator+(Fixed a, Fixed b) { return from_raw(saturated_sum(a.raw_, b.raw_)); }
     friend constexpr Fixed operator-(Fixed a, Fixed b) {
-        return from_raw(saturate32(static_cast<std::int64_t>(a.raw_) - b.raw_));
+        return from_raw(saturated_difference(a.raw_, b.raw_));
     }
     friend constexpr Fixed operator*(Fixed a, Fixed b) {
-        return from_raw(saturate32(round_shift(static_cast<std::int64_t>(a.raw_) * b.raw_, FractionBits)));
+        return from_raw(narrowed<FractionBits>(product(a.raw_, b.raw_)));
     }
     friend constexpr Fixed operator/(Fixed a, Fixed b) {
         if (b.raw_ == 0) return a.raw_ > 0 ? max() : (a.raw_ < 0 ? min() : Fixed{});

@@ -58,6 +58,16 @@ inline constexpr auto kLog2Table = [] {
     return table;
 }();
 
+/// log2(1 + (i + 1/2)/256) in Q10.
+inline constexpr auto kLog2CoarseTable = [] {
+    std::array<std::uint16_t, 256> table{};
+    for (std::uint32_t i = 0; i < table.size(); ++i) {
+        const std::uint32_t x = (std::uint32_t{1} << 30) + (2 * i + 1) * (std::uint32_t{1} << 21);
+        table[i] = static_cast<std::uint16_t>((log2_fraction_q30(x) + (1U << 19)) >> 20);
+    }
+    return table;
+}();
+
 /// 2^(i/32) in Q15.
 inline constexpr auto kExp2Table = [] {
     std::array<std::uint32_t, kTableSize> table{};
@@ -81,6 +91,12 @@ constexpr std::int32_t log2_q10(std::uint32_t v) {
     const std::uint32_t step = detail::kLog2Table[index + 1] - base;
     const std::uint32_t fraction = base + ((step * rest) >> 11);  // Q16
     return octave * kLogOne + static_cast<std::int32_t>((fraction + (1U << 5)) >> 6);
+}
+
+/// log2(v) in Q6.10 for v > 0 from a table alone: error at most 3.5 steps, 0.01 dB. For the cells of a map.
+constexpr std::int32_t log2_coarse_q10(std::uint32_t v) {
+    const int zeros = std::countl_zero(v);
+    return detail::kLog2CoarseTable[(v << zeros >> 23) & 0xFFU] + (31 - zeros) * kLogOne;
 }
 
 /// 2^(x/1024) in Q30 for x <= 0; relative error below 1e-4 or one unit of the last place. Zero below 2^-31.

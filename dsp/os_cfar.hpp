@@ -86,13 +86,21 @@ class OsCfar {
     std::int32_t noise_offset_;
 };
 
-/// Cells from `first_range_cell` on that are larger than their eight neighbours (Doppler cyclic). The row
-/// below is a neighbour too: the flank of the leakage is no maximum. Of equal neighbours the one later in
-/// memory is larger, so a plateau gives one maximum.
-void local_maxima(const PowerMap& map, int first_range_cell, CellMask& maxima);
-
-/// Tests the cells in `candidates` and writes those over threshold to `hits`. All cells or local maxima only,
-/// as the mask says; rows below first_range_cell never hit.
+/// Tests the cells in `candidates` and writes those over threshold to `hits`; rows below first_range_cell
+/// never hit.
 void os_cfar(const PowerMap& map, const OsCfar& cfar, const CellMask& candidates, CellMask& hits);
+
+/// The cells over threshold that are larger than their eight neighbours (Doppler cyclic): what os_cfar()
+/// finds among the local maxima, whatever `level` is. The row below first_range_cell is a neighbour too: the
+/// flank of the leakage is no maximum. Of equal neighbours the one later in memory is larger, so a plateau
+/// gives one maximum.
+///
+/// Fast because most maxima of noise need no look at their reference cells: packed compares, two cells in a
+/// word, give the maxima of a row and the cells that are at least `level`; where enough reference cells are,
+/// counted for 32 cells at once, nothing that is less than the threshold over `level` can be a target.
+/// `level`: log2 power, Q6.10; best about one octave below the median of the map. Windows with less than
+/// eight reference cells on each side along Doppler do without. Cost: see `toolchains/target_report.py`; at
+/// most every second cell of a row is tested one by one.
+void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, CellMask& peaks);
 
 }  // namespace dsp

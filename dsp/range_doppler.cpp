@@ -6,71 +6,118 @@
 
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
+#include "dsp/packed.hpp"
+#include "dsp/tapered_fft64.hpp"
 
 namespace dsp {
 
 namespace {
+
+using packed::Pair;
+
 constexpr int kWindowBits = 15;
+constexpr int kCodeBits = 14;  ///< of what tapered_fft64 takes, before the window
+
+/// Windows that add up to more than one over half their length (rectangular, Hamming) leave one bit less to
+/// the data.
+int guard_bits(const Window& window) {
+    return window[0] + window[kWindowLength / 2] > (1 << kWindowBits) ? 1 : 0;
 }
+
+int magnitude_bits(std::span<const Complex16, kChirps> row) {
+    Pair spreads = 0;
+    for (std::size_t k = 0; k < kChirps; k += 8) {
+        for (std::size_t i = k; i < k + 8; ++i) spreads |= packed::spread(std::bit_cast<Pair>(row[i]));
+    }
+    return packed::magnitude_bits(spreads);
+}
+
+/// The window, and `down` bits less, -13..1, for chirps of the same exponent.
+void taper(std::span<Complex16, kChirps> row, const Window& window, int down) {
+    const int lift = 1 - down;  // of the product of which the upper 16 bits are taken
+    const std::int32_t rounding = (1 << 15) >> lift;
+    for (std::size_t k = 0; k < kChirps; ++k) {
+        const Pair x = std::bit_cast<Pair>(row[k]);
+        const auto w = static_cast<Pair>(window[k]);
+        const auto scale = [lift](std::int32_t v) {
+            return static_cast<std::int32_t>(static_cast<std::uint32_t>(v) << lift);
+        };
+        const std::int32_t re = scale(packed::multiply_00(x, w, rounding));
+        const std::int32_t im = scale(packed::multiply_10(x, w, rounding));
+        row[k] = std::bit_cast<Complex16>(packed::pack_high(re, im));
+    }
+}
+
+/// The same for chirps of different exponents, value = row * 2^exponent: as many bits as the row's largest
+/// allows. Returns by how many bits the row became smaller, relative to 2^highest.
+int taper_uneven(std::span<Complex16, kChirps> row, const std::array<std::int16_t, kChirps / 2>& exponent,
+                 int highest, const Window& window, int guard) {
+    constexpr int kExtraBits =
+        15;  // a small chirp beside a burst keeps its own precision until the scale is known
+    const auto down_of = [&](std::size_t k) { return std::min(highest - exponent[k / 2], 31); };
+    std::uint32_t magnitude = 1;
+    for (std::size_t k = 0; k < kChirps; ++k) {
+        for (const std::int32_t x : {row[k].re, row[k].im}) {
+            magnitude |= static_cast<std::uint32_t>(x ^ (x >> 31)) << kExtraBits >> down_of(k);
+        }
+    }
+    const int down = static_cast<int>(std::bit_width(magnitude)) - kExtraBits - kCodeBits + guard;
+    for (std::size_t k = 0; k < kChirps; ++k) {
+        const int shift = kWindowBits + down_of(k) + down;
+        const auto scale = [&](std::int32_t x) {
+            const std::int64_t product = std::int64_t{x} * window[k];
+            return static_cast<std::int16_t>(shift >= 0 ? round_shift(product, std::min(shift, 62))
+                                                        : product * (std::int64_t{1} << -shift));
+        };
+        row[k] = {scale(row[k].re), scale(row[k].im)};
+    }
+    return down;
+}
+
+}  // namespace
 
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum) {
+    const int guard = guard_bits(window);
     for (std::size_t pair = 0; pair < kChirps / 2; ++pair) {
-        std::array<std::array<std::int16_t, kSamples>, 2> samples;
-        for (std::size_t i = 0; i < 2; ++i) {
-            const std::size_t chirp = 2 * pair + i;
-            remove_dc(frame.chirp[chirp], levels.sum[chirp], levels.exponent[pair], samples[i]);
-        }
+        const std::size_t k = 2 * pair;
+        const int exponent = levels.exponent[pair] + guard;
         Spectrum64 z;
-        for (std::size_t n = 0; n < kSamples; ++n) {
-            z[n] = {static_cast<std::int16_t>(round_shift(samples[0][n] * window[n], kWindowBits)),
-                    static_cast<std::int16_t>(round_shift(samples[1][n] * window[n], kWindowBits))};
+        remove_dc(frame.chirp[k], levels.sum[k], frame.chirp[k + 1], levels.sum[k + 1], exponent, window, z);
+        tapered_fft64_real_pair(z, &spectrum.row[0][k], kChirps);
+        // remove_dc rounds down: half a step in each of 64 samples is two in the sum, and in cell 0 alone.
+        for (std::size_t i = k; i < k + 2; ++i) {
+            spectrum.row[0][i].re = static_cast<std::int16_t>(spectrum.row[0][i].re + 2);
         }
-        std::array<Complex16, kRangeCells> even;
-        std::array<Complex16, kRangeCells> odd;
-        const int exponent = fft64_real_pair(z, even, odd);
-        spectrum.chirp_exponent[pair] = static_cast<std::int16_t>(exponent + levels.exponent[pair]);
-        for (std::size_t r = 0; r < kRangeCells; ++r) {
-            spectrum.row[r][2 * pair] = even[r];
-            spectrum.row[r][2 * pair + 1] = odd[r];
-        }
+        spectrum.chirp_exponent[pair] = static_cast<std::int16_t>(exponent + kTaperedPairExponent);
     }
 }
 
 void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell) {
     auto& row = spectrum.row[static_cast<std::size_t>(range_cell)];
-    std::int16_t& row_exponent = spectrum.row_exponent[static_cast<std::size_t>(range_cell)];
-    const int highest = *std::ranges::max_element(spectrum.chirp_exponent);
-
-    // Q15 products at the common exponent, then as many bits as the row's largest allows.
-    struct Product {
-        std::int32_t re;
-        std::int32_t im;
-    };
-    std::array<Product, kChirps> product;
-    std::uint32_t magnitude = 0;
-    for (std::size_t k = 0; k < kChirps; ++k) {
-        const int down = std::min(highest - spectrum.chirp_exponent[k / 2], 31);
-        product[k] = {round_shift(row[k].re * window[k], down), round_shift(row[k].im * window[k], down)};
-        magnitude |= static_cast<std::uint32_t>(product[k].re ^ (product[k].re >> 31));
-        magnitude |= static_cast<std::uint32_t>(product[k].im ^ (product[k].im >> 31));
+    const auto [lowest, highest] = std::ranges::minmax(spectrum.chirp_exponent);
+    const int guard = guard_bits(window);
+    int down = magnitude_bits(row) - kCodeBits + guard;
+    if (lowest == highest && down <= 1) {
+        taper(row, window, down);
+    } else {
+        down = taper_uneven(row, spectrum.chirp_exponent, highest, window, guard);
     }
-    const int shift = std::max(static_cast<int>(std::bit_width(magnitude)) - 15, 0);
-    for (std::size_t k = 0; k < kChirps; ++k) {
-        row[k] = {saturate16(round_shift(product[k].re, shift)),
-                  saturate16(round_shift(product[k].im, shift))};
-    }
-    row_exponent = static_cast<std::int16_t>(fft64(row) + shift - kWindowBits + highest);
+    tapered_fft64(row);
+    spectrum.row_exponent[static_cast<std::size_t>(range_cell)] =
+        static_cast<std::int16_t>(highest + down + kTaperedExponent);
 }
 
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
                std::span<std::uint16_t, kDopplerCells> power) {
-    for (std::size_t d = 0; d < kDopplerCells; ++d) {
-        const std::int32_t re = row[d].re;
-        const std::int32_t im = row[d].im;
-        const auto square = static_cast<std::uint32_t>(re * re) + static_cast<std::uint32_t>(im * im);
-        const std::int32_t level = square == 0 ? 0 : log2_q10(square) + 2 * exponent * kLogOne;
-        power[d] = static_cast<std::uint16_t>(std::max<std::int32_t>(level, 0));
+    const std::int32_t scale = 2 * exponent * kLogOne;
+    for (std::size_t i = 0; i < kDopplerCells; i += 4) {
+        for (std::size_t d = i; d < i + 4; ++d) {
+            const Pair x = std::bit_cast<Pair>(row[d]);
+            const auto square = static_cast<std::uint32_t>(packed::dot(x, x, 0));  // at most 2^31
+            power[d] = static_cast<std::uint16_t>(
+                std::max<std::int32_t>(log2_coarse_q10(std::max<std::uint32_t>(square, 1)) + scale, 0));
+        }
     }
 }
 

@@ -37,15 +37,17 @@ struct PowerMap {
     }
 };
 
-/// DC removal, window and range transform, two chirps at a time. The window is Q15.
+/// DC removal, window and range transform, two chirps at a time. The window is Q15. Codes of the windowed
+/// chirps have 14 bits (13 for windows that add up to more than one over half their length), those of the
+/// spectrum 15; see tapered_fft64 for rounding and overflow.
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum);
 
 /// Window and transform over the chirps of one range cell, in place. Each row has its own exponent, from its
-/// own largest sample.
+/// own largest sample. Chirps of different exponents (a burst in some) take several times as long.
 void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell);
 
-/// One row of the map from one row of the spectrum.
+/// One row of the map from one row of the spectrum. By log2_coarse_q10; a cell of zero reads as one step.
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
                std::span<std::uint16_t, kDopplerCells> power);
 

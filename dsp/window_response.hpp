@@ -22,13 +22,14 @@ struct WindowResponse {
     static constexpr int kReach = 2;  ///< cells on each side of the peak: a Hann main lobe
     static constexpr int kTaps = 2 * kReach + 1;
     static constexpr int kGridPerCell = 16;
-    static constexpr int kGrid = 11;  ///< guesses 0, 1/16 .. 10/16 cell; negative ones are mirrored
+    static constexpr int kGrid = 11;  ///< guesses 0, 1/16 .. 10/16 cell; for negative ones mirror the cells
     static constexpr int kWeightBits = 12;
 
-    using Weights = std::array<std::int16_t, kTaps>;  ///< Q12, for cells -2..2 around the peak
+    /// Q12, for cells -2..2 around the peak, and a zero: in pairs, as packed products take them.
+    using Weights = std::array<std::int16_t, kTaps + 1>;
 
-    std::array<Weights, kGrid> amplitude;  ///< a
-    std::array<Weights, kGrid> offset;     ///< g
+    alignas(4) std::array<Weights, kGrid> amplitude;  ///< a
+    alignas(4) std::array<Weights, kGrid> offset;     ///< g
     /// Variance of A (of d times A^2) for noise of power one in each cell, Q12: a' C a and g' C g.
     std::array<std::uint16_t, kGrid> amplitude_variance;
     std::array<std::uint16_t, kGrid> offset_variance;

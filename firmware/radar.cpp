@@ -201,7 +201,7 @@ void Radar::acquire_and_detect() {
     if (health_.inspect(observation_.quality)) {
         dsp::detect(frame_, config_.dsp, scale_, workspace_, detections_);
         observation_.detected = true;
-        observation_.noise_log2_q10 = dsp::noise_level(workspace_.map, config_.dsp.cfar.first_range_cell);
+        observation_.noise_log2_q10 = workspace_.noise_level;
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "can/messages.hpp"
 #include "firmware/text_line.hpp"
 #include "firmware/version.hpp"
 
@@ -11,6 +12,11 @@ namespace {
 constexpr std::array<std::string_view, 4> kModes{"starting", "operating", "degraded", "failed"};
 constexpr std::array<std::string_view, 4> kCanStates{"active", "passive", "bus off", "down"};
 constexpr std::array<std::string_view, 4> kWarnings{"none", "inform", "warn", "brake"};
+/// By bit of can::Fault.
+constexpr std::array<std::string_view, 12> kFaults{
+    "adc dead",     "adc stuck", "adc saturated", "frame missing", "frame invalid", "blocked",
+    "interference", "capacity",  "ego stale",     "can error",     "overrun",       "internal"};
+static_assert(static_cast<int>(can::Fault::internal) == 1 << (kFaults.size() - 1));
 
 template <std::size_t N, class Enum>
 std::string_view name(const std::array<std::string_view, N>& names, Enum value) {
@@ -88,7 +94,10 @@ void ServiceConsole::status(std::uint32_t stack_used_bytes) {
         .number(board_.clock.now_us() / 1000)
         .text(" ms ")
         .text(name(kModes, radar_.health().mode()));
-    line.text(", faults ").hex(radar_.health().faults());
+    for (std::size_t bit = 0, shown = 0; bit < kFaults.size(); ++bit) {
+        if ((radar_.health().faults() >> bit & 1) == 0) continue;
+        line.text(shown++ == 0 ? ": " : " + ").text(kFaults[bit]);
+    }
     line.text(", detections ").number(static_cast<std::uint32_t>(radar_.detections().count));
     line.text(", tracks ").number(radar_.tracks().size());
     line.text(", warning ").text(name(kWarnings, radar_.warning().level));

@@ -34,14 +34,13 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kHearBoard{3000};     ///< a radar that runs says something every period
-constexpr milliseconds kRestartAnswer{600};  ///< six periods
+constexpr std::uint64_t kRestartLists = 6;
 constexpr int kRestartAttempts = 8;
-/// A beat frame without answer counts as lost after this long. A board answers within 0.2 s; its emulator on
-/// a busy machine may take seconds to swallow a packet, byte by byte.
-constexpr milliseconds kAnswer{15'000};
 constexpr int kLostInARow = 3;  ///< then the board takes no frames at all
-constexpr int kWriteTimeout_ms = 20'000;
+/// From the end of a packet to the start of the next: the time in which a board need not look at the line.
+constexpr std::chrono::microseconds kGap{dsp::kDefaultWaveform.period_ms * 1000 -
+                                         std::int64_t{hal::kBeatPacketBytes} * 10 * 1'000'000 /
+                                             hal::kBeatLinkBaud};
 
 template <class T>
 std::unique_ptr<T> opened_or_throw(hal::Opened<T> opened) {
@@ -225,7 +224,7 @@ class Session {
     }
 
     void hear_board() {
-        const auto until = Clock::now() + kHearBoard;
+        const auto until = Clock::now() + options_.patience;
         while (const auto heard = next_frame(until)) {
             if (can::status::kMessage.has(heard->frame.id)) return;
         }
@@ -243,9 +242,13 @@ class Session {
             commands.push_back(car_.frame(can::Command{.code = can::CommandCode::restart,
                                                        .sequence = static_cast<std::uint8_t>(attempt)}));
             send_to_bus(commands.back());
-            const auto until = Clock::now() + kRestartAnswer;
-            while (const auto heard = next_frame(until)) {
-                if (can::status::kMessage.has(heard->frame.id)) list.clear();
+            for (std::uint64_t lists = 0; lists <= kRestartLists;) {
+                const auto heard = next_frame(Clock::now() + options_.patience);
+                if (!heard) break;
+                if (can::status::kMessage.has(heard->frame.id)) {
+                    list.clear();
+                    ++lists;
+                }
                 list.push_back(*heard);
                 can::CommandEcho echo;
                 if (!can::decode(heard->frame, echo) || echo.code != can::CommandCode::restart ||
@@ -280,7 +283,7 @@ class Session {
         }
         ++sequence_;
         hal::encode_beat_packet(frame_, sequence_, packet_);
-        switch (serial_->write(packet_, kWriteTimeout_ms)) {
+        switch (serial_->write(packet_, static_cast<int>(options_.patience.count()))) {
             case hal::SerialResult::ok:
                 break;
             case hal::SerialResult::timeout:
@@ -289,7 +292,8 @@ class Session {
                 throw InputError("serial line " + options_.serial +
                                  ": closed by the other end, or unplugged");
         }
-        complete_[sequence_] = Clock::now();
+        complete_at_ = Clock::now();
+        complete_[sequence_] = complete_at_;
         twin_.beat_sent(sequence_, frame_);
         ++report_.frames_sent;
     }
@@ -332,36 +336,50 @@ class Session {
         return true;
     }
 
+    /// The same, for as long as a frame may take to be answered.
+    template <class Done>
+    bool pump_patiently(Done done) {
+        return pump(Clock::now() + options_.patience, done);
+    }
+
+    [[nodiscard]] bool silent() const { return Clock::now() > last_heard_ + options_.patience; }
+    [[nodiscard]] bool hopeless() const { return too_different() || report_.fell_silent; }
+
     void await_list() {
         const std::uint64_t before = verdicts_;
-        pump(Clock::now() + kHearBoard, [&] { return verdicts_ != before; });
+        pump_patiently([&] { return verdicts_ != before; });
     }
 
     void lockstep() {
         await_list();
         int lost = 0;
-        for (std::uint64_t i = 0; i < scene_.frames() && lost < kLostInARow && !too_different(); ++i) {
+        for (std::uint64_t i = 0; i < scene_.frames() && lost < kLostInARow && !hopeless(); ++i) {
+            pump(complete_at_ + kGap, [] { return false; });
             send_frame(i);
-            const bool answered =
-                pump(Clock::now() + kAnswer, [this] { return processed_ == sequence_ || too_different(); });
-            lost = answered ? 0 : lost + 1;
+            // A cycle with a damaged frame can only have had this one.
+            const std::uint64_t damaged = report_.board.invalid;
+            pump_patiently([&] {
+                return processed_ == sequence_ || report_.board.invalid != damaged || too_different();
+            });
+            lost = processed_ == sequence_ ? 0 : lost + 1;
+            report_.fell_silent = silent();
         }
     }
 
     void real_time() {
         await_list();
         const auto start = Clock::now();
-        for (std::uint64_t i = 0; i < scene_.frames() && !too_different(); ++i) {
+        for (std::uint64_t i = 0; i < scene_.frames() && !hopeless(); ++i) {
             const auto due = start + static_cast<Clock::rep>(i) * kPeriod;
             if (Clock::now() > due + kPeriod / 2) ++report_.late_sends;
             pump(due, [] { return false; });
-            send_frame(i);
+            report_.fell_silent = silent();
+            if (!hopeless()) send_frame(i);
         }
     }
 
     void finish() {
-        if (!too_different())
-            pump(Clock::now() + kAnswer, [this] { return twin_.outstanding() == 0 || too_different(); });
+        if (!hopeless()) pump_patiently([this] { return twin_.outstanding() == 0 || too_different(); });
         if (const auto verdict = twin_.give_up_list()) note(*verdict, last_heard_);
         report_.board = twin_.counters();
         report_.frames_lost = report_.frames_sent - report_.board.processed;
@@ -395,6 +413,7 @@ class Session {
     std::uint32_t sequence_ = 0;                           ///< of the last packet
     std::optional<std::uint32_t> processed_;               ///< newest packet that is in a list
     std::map<std::uint32_t, Clock::time_point> complete_;  ///< when a packet had left the PC
+    Clock::time_point complete_at_;                        ///< of the last one
     Clock::time_point start_ = Clock::now();
     Clock::time_point last_heard_;
     std::uint64_t verdicts_ = 0;
@@ -434,6 +453,13 @@ std::string to_text(const HilReport& r) {
              : r.board.different != 0 ? "DIFFERENT"
                                       : "FRAMES LOST, all else identical")
          << '\n';
+    if (r.fell_silent) {
+        text << "               the board fell silent: power, reset or bus fault? Its console tells why the "
+                "last run ended\n";
+    } else if (r.frames_sent != 0 && r.board.processed == 0) {
+        text << "               no beat frame reached the board: is this the serial line of its beat input, "
+                "1 Mbaud, and not the console?\n";
+    }
     return text.str();
 }
 
@@ -450,6 +476,7 @@ nlohmann::json to_json(const HilReport& r) {
             {"overruns", r.board.overruns},
             {"can_frames", r.board.can_frames},
             {"can_overflow", r.can_overflow},
+            {"fell_silent", r.fell_silent},
             {"latency_ms",
              {{"min", r.latency_ms.min},
               {"mean", r.latency_ms.mean},

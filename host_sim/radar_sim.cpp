@@ -69,6 +69,7 @@ struct Arguments {
     bool realtime = false;
     bool list = false;
     sim::HilOptions hil;
+    int patience_s = 3;
 };
 
 void resolve(Arguments& a, bool frames_given) {
@@ -87,6 +88,7 @@ void resolve(Arguments& a, bool frames_given) {
     if (a.realtime) o.speed = 1;
     if (!a.scenario.empty()) o.scenario = sim::load_scenario(a.scenario);
     if (!a.waveform.empty()) o.waveform = sim::read_waveform(a.waveform);
+    a.hil.patience = std::chrono::seconds(a.patience_s);
 }
 
 /// Created before the run, so that a path that cannot be written costs no run.
@@ -213,6 +215,12 @@ int main(int argc, char** argv) {
         "--lockstep", a.hil.lockstep,
         "with --hil: the next frame after the last CAN frame of the one before; else in real time");
     lockstep->needs(hil);
+    auto* patience =
+        app.add_option("--patience", a.patience_s,
+                       "with --hil: seconds the board may say nothing or leave a frame unanswered; "
+                       "more for an emulated board on a busy machine");
+    patience->check(CLI::Range(1, 600))->capture_default_str();
+    patience->needs(hil);
     app.add_flag("--quiet", o.quiet, "no output but errors");
     for (auto* input : {scenario, replay, traffic, detections}) {
         for (auto* other : {scenario, replay, traffic, detections, list})

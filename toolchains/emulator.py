@@ -18,6 +18,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 # Serial lines in the order of the emulator's -serial options. zcu102: UART0, UART1. mps2: UART0, UART1, UART2.
@@ -46,6 +47,7 @@ class Emulator:
         self.directory = tempfile.mkdtemp(prefix="radar_emulator_")
         self.serial = {}
         self.process = None
+        self.qmp = None
         try:
             self._start(image, can_interface, icount, warp, serve or {}, list(extra))
         except BaseException:
@@ -70,15 +72,14 @@ class Emulator:
             listeners[name] = listener
             serial_options += ["-chardev", f"socket,id={name},path={path}", "-serial", f"chardev:{name}"]
         qmp_path = os.path.join(self.directory, "qmp")
-        common = ["-display", "none", "-monitor", "none", "-semihosting-config", "enable=on,target=native"]
+        common = ["-qmp", f"unix:{qmp_path},server=on,wait=off", "-display", "none", "-monitor", "none", "-semihosting-config", "enable=on,target=native"]
         if icount is not None:
             common += ["-icount", f"shift={icount}" + (",sleep=off" if warp else "")]
         if self.board == "zcu102":
             command = ["qemu-system-aarch64", "-M", "xlnx-zcu102,canbus0=cb0,canbus1=cb0",
                        "-object", "can-bus,id=cb0", "-smp", "6", "-m", "2G",
                        "-global", "xlnx-zynqmp.boot-cpu=rpu-cpu[0]",
-                       "-device", f"loader,file={image},cpu-num=4",
-                       "-qmp", f"unix:{qmp_path},server=on,wait=off", "-S"]
+                       "-device", f"loader,file={image},cpu-num=4", "-S"]
             if can_interface:
                 command += ["-object", f"can-host-socketcan,id=host0,if={can_interface},canbus=cb0"]
         else:
@@ -93,8 +94,10 @@ class Emulator:
                                         cwd=self.working_directory)
         for name, listener in listeners.items():
             self.serial[name] = self._accept(listener)
+        self._connect(qmp_path)
         if self.board == "zcu102":
-            self._release_r5(qmp_path)
+            self._release_r5()
+        threading.Thread(target=self._keep_awake, daemon=True).start()
 
     def _accept(self, listener):
         listener.settimeout(0.2)
@@ -114,37 +117,48 @@ class Emulator:
         with open(self.messages.name) as messages:
             return "".join(line for line in messages if "module audio-" not in line)
 
-    def _release_r5(self, qmp_path):
-        """Without this the emulator leaves the R5 powered off and starts the application processor."""
-        for _ in range(100):
-            if os.path.exists(qmp_path):
+    def _connect(self, qmp_path):
+        """To the emulator's control line."""
+        for _ in range(400):
+            if os.path.exists(qmp_path) or self.process.poll() is not None:
                 break
             time.sleep(0.05)
-        qmp = socket.socket(socket.AF_UNIX)
-        qmp.settimeout(20)
-        qmp.connect(qmp_path)
-        stream = qmp.makefile("rw")
+        self.qmp = socket.socket(socket.AF_UNIX)
+        self.qmp.settimeout(20)
+        self.qmp.connect(qmp_path)
+        self.control = self.qmp.makefile("rw")
+        self.control.readline()
+        self._execute("qmp_capabilities")
 
-        def execute(command, **arguments):
-            stream.write(json.dumps({"execute": command, "arguments": arguments}) + "\n")
-            stream.flush()
-            while True:
-                line = stream.readline()
-                if not line:
-                    raise RuntimeError("the emulator closed its control connection")
-                answer = json.loads(line)
-                if "error" in answer:
-                    raise RuntimeError(f"emulator: {answer['error']['desc']}")
-                if "return" in answer:
-                    return
+    def _execute(self, command, **arguments):
+        self.control.write(json.dumps({"execute": command, "arguments": arguments}) + "\n")
+        self.control.flush()
+        while True:
+            line = self.control.readline()
+            if not line:
+                raise RuntimeError("the emulator closed its control connection")
+            answer = json.loads(line)
+            if "error" in answer:
+                raise RuntimeError(f"emulator: {answer['error']['desc']}")
+            if "return" in answer:
+                return
 
-        stream.readline()
-        execute("qmp_capabilities")
+    def _release_r5(self):
+        """Without this the emulator leaves the R5 powered off and starts the application processor."""
         for line in ("qom-set /machine/soc/rpu-cluster/rpu-cpu[0] start-powered-off false",
                      "qom-set /machine/soc/apu-cluster/apu-cpu[0] start-powered-off true",
                      "system_reset", "cont"):
-            execute("human-monitor-command", **{"command-line": line})
-        self.qmp = qmp  # kept open until the end
+            self._execute("human-monitor-command", **{"command-line": line})
+
+    def _keep_awake(self):
+        """The emulator can miss that an image has made room for received bytes, and then sleeps until something else
+        happens. White space on its control line is that, and nothing more."""
+        try:
+            while True:
+                self.qmp.sendall(b"\n")
+                time.sleep(0.02)
+        except OSError:
+            pass  # it has ended
 
     def wait(self, seconds):
         """Exit code of the image, or None when it is still running after `seconds`."""
@@ -157,7 +171,7 @@ class Emulator:
         if self.process and self.process.poll() is None:
             self.process.kill()
             self.process.wait()
-        for connection in self.serial.values():
+        for connection in [*self.serial.values(), *([self.qmp] if self.qmp else [])]:
             connection.close()
         shutil.rmtree(self.directory, ignore_errors=True)
 

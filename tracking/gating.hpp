@@ -1,12 +1,12 @@
 /// Which measurements can be a track's, and how much likelier each is the target than clutter.
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "tracking/association.hpp"
+#include "tracking/bits.hpp"
 #include "tracking/kalman.hpp"
 #include "tracking/scalar.hpp"
 #include "tracking/track.hpp"
@@ -62,48 +62,49 @@ class Gate {
                           config.min_rate_sigma_mps * config.min_rate_sigma_mps),
           obscured_variance_(config.obscured_range_sigma_m * config.obscured_range_sigma_m,
                              config.obscured_rate_sigma_mps * config.obscured_rate_sigma_mps),
+          half_span_(config.rate_span_mps * constant<S>(1, 2)),
           gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
           seen_(logs(config.detection_probability)),
           obscured_(logs(config.obscured_detection_probability)) {}
 
     /// nu = z - x, with the range rate unfolded to the ambiguity nearest to x and the range shifted with it.
     [[nodiscard]] Vec2<S> innovation(const Vec2<S>& x, const Vec2<S>& z) const {
-        Vec2<S> nu(z[0] - x[0], z[1] - x[1]);
-        const S half = config_.rate_span_mps * constant<S>(1, 2);
-        if (half <= S(0)) return nu;
-        for (int k = 0; k < kMaxFolds && nu[1] > half; ++k) {
-            nu[0] += config_.alias_range_m;
-            nu[1] -= config_.rate_span_mps;
+        S range = z[0] - x[0];
+        S rate = z[1] - x[1];
+        if (half_span_ > S(0)) {
+            for (int k = 0; k < kMaxFolds && rate > half_span_; ++k) {
+                range += config_.alias_range_m;
+                rate -= config_.rate_span_mps;
+            }
+            for (int k = 0; k < kMaxFolds && rate < -half_span_; ++k) {
+                range -= config_.alias_range_m;
+                rate += config_.rate_span_mps;
+            }
         }
-        for (int k = 0; k < kMaxFolds && nu[1] < -half; ++k) {
-            nu[0] -= config_.alias_range_m;
-            nu[1] += config_.rate_span_mps;
-        }
-        return nu;
+        return {range, rate};
     }
 
     /// R: the measurement's variances, not below the configured least, and wider for an obscured track.
     [[nodiscard]] Vec2<S> noise(const Measurement<S>& m, bool obscured) const {
-        Vec2<S> r;
-        for (int i = 0; i < 2; ++i) {
-            r[i] = m.variance[i] > least_variance_[i] ? m.variance[i] : least_variance_[i];
-            if (obscured) r[i] += obscured_variance_[i];
-        }
-        return r;
+        const auto larger = [](S a, S b) { return a > b ? a : b; };
+        const Vec2<S> r(larger(m.variance[0], least_variance_[0]), larger(m.variance[1], least_variance_[1]));
+        if (!obscured) return r;
+        return {r[0] + obscured_variance_[0], r[1] + obscured_variance_[1]};
     }
 
     /// ln of the likelihood ratio PD N(nu; 0, S) / lambda of a measurement inside the gate; nothing outside,
     /// or when S is singular.
     [[nodiscard]] bool test(const Vec2<S>& nu, const Mat2<S>& p, const Vec2<S>& r, S& distance2,
                             S& log_density) const {
-        const Mat2<S> s = innovation_covariance(p, r);
         // Each coordinate alone, without a division: rejects nearly all.
-        if (nu[0] * nu[0] > config_.gate * s(0, 0) || nu[1] * nu[1] > config_.gate * s(1, 1)) return false;
-        const Ldl<S> factors(s);
-        if (!factors.valid()) return false;
-        distance2 = factors.distance2(nu);
+        if (product_exceeds(nu[0], nu[0], config_.gate, S(p(0, 0) + r[0])) ||
+            product_exceeds(nu[1], nu[1], config_.gate, S(p(1, 1) + r[1])))
+            return false;
+        const Innovation<S> innovation(p, r);
+        if (!innovation.valid()) return false;
+        distance2 = innovation.distance2(nu);
         if (distance2 > config_.gate) return false;
-        log_density = factors.log_density(distance2);
+        log_density = innovation.log_density(distance2);
         return true;
     }
 
@@ -118,17 +119,16 @@ class Gate {
         row.dropped = 0;
         row.obscured = obscured;
         row.log_missed = logs.missed;
-        for (std::uint64_t rest = usable; rest != 0; rest &= rest - 1) {
-            const auto index = static_cast<std::size_t>(std::countr_zero(rest));
-            if (index >= measurements.size()) break;
+        for_each_bit(usable, [&](std::uint32_t index) {
+            if (index >= measurements.size()) return;
             const Measurement<S>& m = measurements[index];
             S distance2(0);
             S log_density(0);
-            if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) continue;
+            if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) return;
             const S excess = log_excess.empty() ? S(0) : log_excess[index];
             insert(row,
                    {static_cast<std::uint16_t>(index), logs.detected + log_density - excess, S(0), S(0)});
-        }
+        });
     }
 
     /// The gate of a filled row for the rank-based associators: clutter expected in it, and the target's
@@ -202,6 +202,7 @@ class Gate {
     GateConfig<S> config_;
     Vec2<S> least_variance_;
     Vec2<S> obscured_variance_;
+    S half_span_;
     S gate_probability_;
     SensorLogs<S> seen_;
     SensorLogs<S> obscured_;

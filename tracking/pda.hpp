@@ -9,6 +9,7 @@
 #include "tracking/association.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/kalman.hpp"
+#include "tracking/wide_sum.hpp"
 
 namespace tracking {
 
@@ -35,6 +36,35 @@ void pda(std::span<AssociationRow<S>> rows) {
     }
 }
 
+/// A weighted sum of symmetric matrices, rounded once, at the end.
+template <class S>
+class SymmetricSum {
+  public:
+    void add(S weight, const Mat2<S>& m) {
+        sum00_.add_product(weight, m(0, 0));
+        sum01_.add_product(weight, m(0, 1));
+        sum11_.add_product(weight, m(1, 1));
+    }
+    /// weight v v'.
+    void add_outer(S weight, const Vec2<S>& v) {
+        const S wv0 = weight * v[0];
+        const S wv1 = weight * v[1];
+        sum00_.add_product(wv0, v[0]);
+        sum01_.add_product(wv0, v[1]);
+        sum11_.add_product(wv1, v[1]);
+    }
+    [[nodiscard]] Mat2<S> value() const {
+        Mat2<S> m;
+        m(0, 0) = sum00_.value();
+        m(0, 1) = m(1, 0) = sum01_.value();
+        m(1, 1) = sum11_.value();
+        return m;
+    }
+
+  private:
+    WideSum<S> sum00_, sum01_, sum11_;
+};
+
 /// Moves (x, P) by the weighted corrections of a row: the Gaussian mixture over "missed" and each candidate,
 /// each with its own gain because each has its own R, matched in mean and covariance.
 ///
@@ -46,34 +76,29 @@ void update_with_row(Vec2<S>& x, Mat2<S>& p, const AssociationRow<S>& row,
                      std::span<const Measurement<S>> measurements, const Gate<S>& gate) {
     const S negligible = constant<S>(1, 1 << 14);
     std::array<Vec2<S>, kMaxGated> moves;
-    Vec2<S> mean(S(0), S(0));
-    Mat2<S> spread = p * row.missed;
+    WideSum<S> mean_range, mean_rate;
+    SymmetricSum<S> spread;
+    spread.add(row.missed, p);
     for (std::size_t i = 0; i < static_cast<std::size_t>(row.count); ++i) {
         const Candidate<S>& c = row.item[i];
-        moves[i] = Vec2<S>(S(0), S(0));
         if (c.beta < negligible && c.weight < negligible) continue;
         const Measurement<S>& m = measurements[c.measurement];
-        const Vec2<S> r = gate.noise(m, row.obscured);
-        const Ldl<S> s(innovation_covariance(p, r));
-        const Mat2<S> k = gain(p, s);
-        moves[i] = correction(k, gate.innovation(x, m.z));
-        mean[0] += c.weight * moves[i][0];
-        mean[1] += c.weight * moves[i][1];
-        const Mat2<S> posterior = posterior_covariance(p, k, r);
-        spread(0, 0) += c.beta * posterior(0, 0);
-        spread(0, 1) += c.beta * posterior(0, 1);
-        spread(1, 1) += c.beta * posterior(1, 1);
+        const Innovation<S> innovation(p, gate.noise(m, row.obscured));
+        moves[i] = innovation.move(gate.innovation(x, m.z));
+        mean_range.add_product(c.weight, moves[i][0]);
+        mean_rate.add_product(c.weight, moves[i][1]);
+        if (!(c.beta < negligible)) spread.add(c.beta, innovation.posterior());
     }
-    add_outer(spread, row.missed, mean);
+    const Vec2<S> mean(mean_range.value(), mean_rate.value());
+    spread.add_outer(row.missed, mean);
     for (std::size_t i = 0; i < static_cast<std::size_t>(row.count); ++i) {
-        const Candidate<S>& c = row.item[i];
-        if (c.beta < negligible) continue;
-        add_outer(spread, c.beta, Vec2<S>(moves[i][0] - mean[0], moves[i][1] - mean[1]));
+        const S beta = row.item[i].beta;
+        if (beta < negligible) continue;
+        spread.add_outer(beta, Vec2<S>(moves[i][0] - mean[0], moves[i][1] - mean[1]));
     }
-    spread(1, 0) = spread(0, 1);
     x[0] += mean[0];
     x[1] += mean[1];
-    p = spread;
+    p = spread.value();
 }
 
 }  // namespace tracking

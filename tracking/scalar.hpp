@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <bit>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <limits>
 
 #include "dsp/fixed_math.hpp"
 #include "dsp/fixed_point.hpp"
@@ -81,6 +83,31 @@ constexpr int floor_to_int(S x) {
 template <class S>
 constexpr S absolute(S x) {
     return x < S(0) ? -x : x;
+}
+
+/// a b > c d; exact in fixed point, where each product could be past the range of S.
+template <class S>
+constexpr bool product_exceeds(S a, S b, S c, S d) {
+    if constexpr (std::floating_point<S>) {
+        return a * b > c * d;
+    } else {
+        return dsp::product(a.raw(), b.raw()) > dsp::product(c.raw(), d.raw());
+    }
+}
+
+/// A number not below sqrt(x), and not more than 7 % and 3 LSB above: the mean of a and x / a for a power of
+/// two a.
+template <class S>
+constexpr S sqrt_above(S x) {
+    if constexpr (std::floating_point<S>) {
+        return std::sqrt(x) * (1 + std::numeric_limits<S>::epsilon());
+    } else {
+        if (x.raw() <= 0) return S(0);
+        const std::uint64_t square = static_cast<std::uint64_t>(x.raw()) << S::fraction_bits;
+        const int k = std::bit_width(square) / 2;
+        const std::uint64_t sum = (std::uint64_t{1} << k) + (square >> k);
+        return S::from_raw(dsp::saturate32(static_cast<std::int64_t>(sum / 2) + 2));
+    }
 }
 
 /// Not a number or infinite; a fixed-point number never is.

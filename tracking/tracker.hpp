@@ -391,7 +391,7 @@ bool Tracker<S>::best_start(const Pending& from, const Measurement<S>& to, S& di
     const S change = gate_.innovation(from.measurement.z, to.z)[1];
     const S speed_up = config_.motion.acceleration_sigma_mps2 * config_.motion.period_s;
     const S variance = from_noise[1] + to_noise[1] + speed_up * speed_up * static_cast<int>(from.age);
-    if (change * change > config_.gate.gate * variance) return false;
+    if (product_exceeds(change, change, config_.gate.gate, variance)) return false;
 
     Mat2<S> p = innovation_covariance(Mat2<S>(Mat2<S>::Zero()), from_noise);
     for (int i = 0; i < from.age; ++i) p = predict_covariance(p, config_.motion);
@@ -440,12 +440,11 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         }
         if (partner < 0) continue;
         const Vec2<S> nu = gate_.innovation(best.x, m.z);
-        const Vec2<S> r = gate_.noise(m, false);
-        const Mat2<S> k = gain(best.covariance, Ldl<S>(innovation_covariance(best.covariance, r)));
-        const Vec2<S> move = correction(k, nu);
+        const Innovation<S> innovation(best.covariance, gate_.noise(m, false));
+        const Vec2<S> move = innovation.move(nu);
         best.x[0] += move[0];
         best.x[1] += move[1];
-        best.covariance = posterior_covariance(best.covariance, k, r);
+        best.covariance = innovation.posterior();
         if (!in_field(best) || !make_room_for_tentative(m.snr_db, report)) continue;
         used |= bit(static_cast<std::size_t>(partner));
         left &= ~bit(index);
@@ -540,6 +539,14 @@ template <class S>
 void Tracker<S>::merge(TrackerReport& report) {
     constexpr std::uint8_t kCoasting = 3;  // misses in a row
     const Vec2<S> least = gate_.noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, false);
+    const auto near = [&](const Vec2<S>& d, const Mat2<S>& p, const Vec2<S>& r) {
+        const S limit = config_.merge_distance2;
+        if (product_exceeds(d[1], d[1], limit, S(p(1, 1) + r[1])) ||
+            product_exceeds(d[0], d[0], limit, S(p(0, 0) + r[0])))
+            return false;
+        const Innovation<S> innovation(p, r);
+        return innovation.valid() && innovation.distance2(d) < limit;
+    };
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& b = track_[i];
         bool same = false;
@@ -550,8 +557,7 @@ void Tracker<S>::merge(TrackerReport& report) {
                 a.is_confirmed() == b.is_confirmed() ? j < i || b.misses >= kCoasting : a.is_confirmed();
             if (!yields) continue;
             const Vec2<S> d(a.x[0] - b.x[0], a.x[1] - b.x[1]);
-            const Ldl<S> accuracy(innovation_covariance(a.covariance, least));
-            same = accuracy.valid() && accuracy.distance2(d) < config_.merge_distance2;
+            same = near(d, a.covariance, least);
         }
         b.overlap = same ? static_cast<std::uint8_t>(b.overlap + 1) : std::uint8_t{0};
         if (b.overlap < config_.merge_frames) continue;

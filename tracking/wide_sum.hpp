@@ -21,12 +21,18 @@ class WideSum {
     WideSum() = default;
     explicit WideSum(S v) { add(v); }
 
-    void add(S v) { add_product(v, S(1)); }
+    void add(S v) {
+        if constexpr (std::floating_point<S>) {
+            sum_ += v;
+        } else {
+            sum_ += static_cast<std::int64_t>(v.raw()) << S::fraction_bits;
+        }
+    }
     void add_product(S a, S b) {
         if constexpr (std::floating_point<S>) {
             sum_ += a * b;
         } else {
-            sum_ += static_cast<std::int64_t>(a.raw()) * b.raw();
+            sum_ = dsp::accumulated(sum_, a.raw(), b.raw());
         }
     }
     WideSum& operator+=(const WideSum& o) {
@@ -52,13 +58,12 @@ class WideSum {
         return out;
     }
 
-    /// The sum as S: rounded to nearest (a tie goes up), saturated.
+    /// The sum as S: rounded half to even, saturated.
     [[nodiscard]] S value() const {
         if constexpr (std::floating_point<S>) {
             return sum_;
         } else {
-            constexpr std::int64_t kHalf = std::int64_t{1} << (S::fraction_bits - 1);
-            return S::from_raw(dsp::saturate32((sum_ + kHalf) >> S::fraction_bits));
+            return S::from_raw(dsp::narrowed<S::fraction_bits>(sum_));
         }
     }
 

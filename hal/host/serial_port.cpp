@@ -7,6 +7,7 @@
 #include <cstring>
 #include <ctime>
 #include <memory>
+#include <utility>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -33,7 +34,7 @@ constexpr std::array<Rate, 8> kRates{{{115'200, B115200},
                                       {2'000'000, B2000000},
                                       {3'000'000, B3000000}}};
 
-constexpr std::int64_t kDrainLookNs = 100'000;  ///< ten bytes at 1 Mbaud
+constexpr std::int64_t kDrainLookNs = 500'000;  ///< fifty bytes at 1 Mbaud
 
 /// Raw 8N1. False, with errno, when the driver refuses.
 bool configure(int fd, std::uint32_t baud) {
@@ -84,7 +85,7 @@ int connect_socket(const std::string& path) {
 }
 
 std::string explain(const std::string& path, std::uint32_t baud, int cause) {
-    const std::string what = "serial line " + path + ": " + std::strerror(cause);
+    std::string what = "serial line " + path + ": " + std::strerror(cause);
     switch (cause) {
         case ENOENT:
             return what + "; is the board plugged in? (ls -l /dev/serial/by-id)";
@@ -124,19 +125,22 @@ SerialPort::~SerialPort() {
 
 SerialResult SerialPort::write(std::span<const std::uint8_t> bytes, int timeout_ms) {
     using std::chrono::steady_clock;
-    const auto deadline = steady_clock::now() + std::chrono::milliseconds(timeout_ms);
+    const auto patience = std::chrono::milliseconds(timeout_ms);
+    auto deadline = steady_clock::now() + patience;
+    int pending = 0;
     while (true) {
-        int pending = 0;
         if (bytes.empty()) {
             // The driver's queue, not tcdrain: that has no time limit.
+            const int before = std::exchange(pending, 0);
             if (!tty_ || ioctl(fd_, TIOCOUTQ, &pending) != 0 || pending == 0) return SerialResult::ok;
+            if (pending < before) deadline = steady_clock::now() + patience;
         }
         const auto left =
             std::chrono::duration_cast<std::chrono::milliseconds>(deadline - steady_clock::now()).count();
         if (left <= 0) return SerialResult::timeout;
         const bool writing = !bytes.empty();
         pollfd waiting{fd_, static_cast<short>(writing ? POLLIN | POLLOUT : POLLIN), 0};
-        const auto wait_ns = writing ? left : kDrainLookNs;
+        const std::int64_t wait_ns = writing ? left * 1'000'000 : kDrainLookNs;
         const timespec wait{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
         const int ready = ppoll(&waiting, 1, &wait, nullptr);
         if (ready < 0 && errno != EINTR) return SerialResult::failed;
@@ -153,7 +157,10 @@ SerialResult SerialPort::write(std::span<const std::uint8_t> bytes, int timeout_
             const ssize_t count = tty_ ? ::write(fd_, bytes.data(), bytes.size())
                                        : ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
             if (count < 0 && errno != EAGAIN && errno != EINTR) return SerialResult::failed;
-            if (count > 0) bytes = bytes.subspan(static_cast<std::size_t>(count));
+            if (count > 0) {
+                bytes = bytes.subspan(static_cast<std::size_t>(count));
+                deadline = steady_clock::now() + patience;
+            }
         }
     }
 }

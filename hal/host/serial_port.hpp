@@ -25,8 +25,8 @@ class SerialPort {
     SerialPort(const SerialPort&) = delete;
     SerialPort& operator=(const SerialPort&) = delete;
 
-    /// Returns when the last byte has left the PC (as far as the driver can tell), after `timeout_ms` at
-    /// most.
+    /// Returns when the last byte has left the PC (as far as the driver can tell), or after `timeout_ms` in
+    /// which none has.
     [[nodiscard]] SerialResult write(std::span<const std::uint8_t> bytes, int timeout_ms);
 
   private:

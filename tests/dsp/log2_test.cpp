@@ -22,6 +22,20 @@ TEST(Log2, LogarithmIsWithinItsStatedError) {
     LONGS_EQUAL(32 * 1024, dsp::log2_q10(0xFFFFFFFFU));
 }
 
+TEST(Log2, CoarseLogarithmIsWithinItsStatedErrorAndNeverFalls) {
+    double worst = 0;
+    std::int32_t last = 0;
+    const auto check = [&](std::uint32_t v) {
+        const std::int32_t now = dsp::log2_coarse_q10(v);
+        worst = std::max(worst, std::abs(now - 1024 * std::log2(static_cast<double>(v))));
+        CHECK(now >= last);
+        last = now;
+    };
+    for (std::uint32_t v = 1; v < 1U << 18; ++v) check(v);
+    for (std::uint64_t v = 1U << 18; v < 1ULL << 32; v += 40'009) check(static_cast<std::uint32_t>(v));
+    CHECK(worst <= 3.5);
+}
+
 TEST(Log2, LogarithmNeverFalls) {
     std::int32_t last = 0;
     for (std::uint32_t v = 1; v < 1U << 18; ++v) {

@@ -1,7 +1,9 @@
 // Expected values: thresholds from Rohling's product formula solved elsewhere in double precision; decisions
 // by sorting; maxima by comparing all neighbours.
+#include <bit>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "dsp/os_cfar.hpp"
 #include "tests/bench/accuracy_dsp.hpp"
@@ -137,41 +139,76 @@ TEST(OsCfar, InvalidConfigurationsAreRecognised) {
     CHECK_FALSE(config.valid());
 }
 
-TEST(OsCfar, LocalMaximaAgainstAllNeighbours) {
-    std::uint32_t state = 99;
-    for (const unsigned levels : {2U, 5U, 60000U}) {
-        for (const int first : {0, 2, 5}) {
-            for (auto& row : map->cell) {
-                for (auto& cell : row) {
-                    state = state * 1664525U + 1013904223U;
-                    cell = static_cast<std::uint16_t>((state >> 8) % levels);
+/// By its definition: over threshold, and no neighbour is larger or equal and later in memory.
+dsp::CellMask peaks_by_definition(const dsp::PowerMap& map, const dsp::OsCfar& cfar) {
+    dsp::CellMask peaks;
+    for (int r = cfar.config().first_range_cell; r < 32; ++r) {
+        for (int d = 0; d < 64; ++d) {
+            bool peak = cfar.detects(map, r, d);
+            for (int i = -1; i <= 1; ++i) {
+                for (int j = -1; j <= 1; ++j) {
+                    const int rr = r + i;
+                    const int dd = (d + j + 64) % 64;
+                    if ((i == 0 && j == 0) || rr < 0 || rr > 31) continue;
+                    const int x = map.at(r, d);
+                    const int y = map.at(rr, dd);
+                    if (y > x || (y == x && 64 * rr + dd > 64 * r + d)) peak = false;
                 }
             }
-            dsp::CellMask maxima;
-            dsp::local_maxima(*map, first, maxima);
-            for (int r = 0; r < 32; ++r) {
-                for (int d = 0; d < 64; ++d) {
-                    bool expected = r >= first;
-                    for (int i = -1; i <= 1; ++i) {
-                        for (int j = -1; j <= 1; ++j) {
-                            const int rr = r + i;
-                            const int dd = (d + j + 64) % 64;
-                            if ((i == 0 && j == 0) || rr < 0 || rr > 31) continue;
-                            const int x = map->cell[static_cast<std::size_t>(r)][static_cast<std::size_t>(d)];
-                            const int y =
-                                map->cell[static_cast<std::size_t>(rr)][static_cast<std::size_t>(dd)];
-                            if (y > x || (y == x && 64 * rr + dd > 64 * r + d)) expected = false;
-                        }
-                    }
-                    LONGS_EQUAL(expected, maxima.test(r, d));
-                }
-            }
+            if (peak) peaks.set(r, d);
         }
     }
-    fill(5);
-    dsp::CellMask maxima;
-    dsp::local_maxima(*map, 2, maxima);
+    return peaks;
+}
+
+TEST(OsCfar, PeaksAreTheLocalMaximaOverThresholdWhateverTheLevel) {
+    std::uint32_t state = 99;
+    const auto random = [&state](unsigned below) {
+        state = state * 1664525U + 1013904223U;
+        return (state >> 8) % below;
+    };
+    std::vector<dsp::CfarConfig> shapes(7);
+    shapes[1] = {1, 8, 2, 2, 2, 12, 0, 10'000'000, 0};   // even distance to the first reference cell
+    shapes[2] = {0, 16, 0, 1, 1, 20, 5, 50'000'000, 0};  // every cell is a reference cell
+    shapes[3] = {2, 8, 2, 0, 2, 12, 2, 1'000'000, 0};
+    shapes[4] = {2, 4, 2, 2, 2, 8, 2, 10'000'000, 0};  // too few for the quick look
+    shapes[5] = {2, 8, 2, 2, 2, 20, 2, 100'000'000, -300};
+    shapes[6] = {3, 12, 2, 2, 2, 28, 1, 100'000'000, 0};  // rank N: a single large cell decides
+    std::size_t found = 0;
+    for (const auto& shape : shapes) {
+        CHECK(shape.valid());
+        const dsp::OsCfar cfar(shape);
+        for (int kind = 0; kind < 6; ++kind) {
+            for (auto& row : map->cell) {
+                for (auto& cell : row) {
+                    const double u = (random(1U << 20) + 0.5) / (1U << 20);
+                    const double noise = 1024 * (20 + std::log2(-std::log(u)));
+                    cell = static_cast<std::uint16_t>(kind == 0   ? random(60'000)
+                                                      : kind == 1 ? random(3) * 20'000
+                                                      : kind == 2 ? 65'535 - random(2)
+                                                      : kind == 3 ? noise + (random(20) == 0 ? 12'000 : 0)
+                                                                  : noise);
+                }
+            }
+            const dsp::CellMask expected = peaks_by_definition(*map, cfar);
+            for (const int level : {0, 1, 9'000, 18'000, 19'000, 20'000, 21'000, 40'000, 65'535}) {
+                dsp::CellMask peaks;
+                dsp::cfar_peaks(*map, cfar, static_cast<std::uint16_t>(level), peaks);
+                for (std::size_t r = 0; r < 32; ++r) CHECK(expected.row[r] == peaks.row[r]);
+            }
+            for (const auto row : expected.row) found += static_cast<std::size_t>(std::popcount(row));
+        }
+    }
+    CHECK(found > 1000);
+}
+
+TEST(OsCfar, APlateauIsOnePeak) {
+    fill(1000);
+    for (std::size_t r = 10; r < 12; ++r) map->cell[r][30] = map->cell[r][31] = map->cell[r][32] = 40000;
+    dsp::CellMask peaks;
+    dsp::cfar_peaks(*map, dsp::OsCfar(dsp::CfarConfig{}), 1000, peaks);
     int count = 0;
-    for (const auto row : maxima.row) count += std::popcount(row);
+    for (const auto row : peaks.row) count += std::popcount(row);
     LONGS_EQUAL(1, count);
+    CHECK(peaks.test(11, 32));  // the last of the equals in memory
 }

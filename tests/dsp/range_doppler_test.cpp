@@ -21,8 +21,10 @@ TEST_GROUP(RangeDoppler) {
     }
 
     /// Every cell's amplitude within 1 % (the logarithm's step and the windows' last place) and `rounding` of
-    /// the map's largest amplitude: 16 bits at each of the two transforms.
-    void compare(const dsp::BeatFrame& frame, WindowKind range, WindowKind doppler, double rounding = 2e-5) {
+    /// the map's largest amplitude: the packed transform adds 0.26 square steps to each part, and a row's
+    /// largest cell has some 16,000 steps; four standard deviations.
+    void compare(const dsp::BeatFrame& frame, WindowKind range, WindowKind doppler,
+                 double rounding = 1.8e-4) {
         dsp::range_doppler(frame, range, doppler, *spectrum, *map);
         const auto exact = bench::power_map(frame, range, doppler);
         const double peak = std::sqrt(*std::ranges::max_element(exact));
@@ -40,7 +42,7 @@ TEST(RangeDoppler, NoiseMapAgreesWithDouble) {
         for (const double sigma : {3.0, 200.0, 7000.0}) {
             bench::Samples samples(4096, 100.0);
             bench::add_noise(samples, sigma, random);
-            compare(bench::convert(samples), range, WindowKind::hann, 1e-3);
+            compare(bench::convert(samples), range, WindowKind::hann, 3e-3);
         }
     }
 }
@@ -76,7 +78,7 @@ TEST(RangeDoppler, ABurstInTwoChirpsLeavesTheOthersTheirPrecision) {
     for (std::size_t n = 0; n < 64; ++n) samples[64 * 20 + n] += n % 2 ? 30000 : -30000;
     const dsp::BeatFrame frame = bench::convert(samples);
     // A burst is no tone: its rounding has no gain from the sum over the chirps.
-    compare(frame, WindowKind::hann, WindowKind::hann, 1e-4);
+    compare(frame, WindowKind::hann, WindowKind::hann, 2e-4);
 }
 
 TEST(RangeDoppler, FullScaleSquareWavesDoNotOverflow) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <random>
 #include <vector>
@@ -169,6 +170,8 @@ TEST(BeatLink, garbage_between_good_packets) {
     // What follows a truncated packet at the very end would still be waited for.
     CHECK_TRUE(good.size() > 50);
     const std::vector<std::uint32_t> got = receive(line, receiver);
+    std::printf("serial link: %zu random bytes, flips and truncations; %zu good frames sent, %zu taken\n",
+                garbage, good.size(), got.size());
     CHECK_TRUE(got == good);
     CHECK_EQUAL(good.size(), receiver.counters().frames);
 }

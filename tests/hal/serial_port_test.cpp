@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
@@ -89,6 +91,28 @@ TEST(SerialPort, GivesUpWhenTheOtherEndTakesNothing) {
     auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
     CHECK_TRUE(port != nullptr);
     CHECK_TRUE(port->write(every_byte(1 << 20), 50) == hal::SerialResult::timeout);
+}
+
+/// A slow other end is not a dead one: what counts is the time in which nothing moves.
+TEST(SerialPort, HasPatienceWhileBytesMove) {
+    Pty pty;
+    auto port = hal::SerialPort::open(pty.path, 1'000'000).value;
+    CHECK_TRUE(port != nullptr);
+    const auto sent = every_byte(40'000);
+    std::vector<std::uint8_t> received;
+    std::thread reader([&] {
+        while (received.size() < sent.size()) {
+            const auto some =
+                read_all(pty.master, std::min<std::size_t>(2'000, sent.size() - received.size()));
+            if (some.empty()) break;
+            received.insert(received.end(), some.begin(), some.end());
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
+    });
+    const auto result = port->write(sent, 200);  // it takes 400 ms
+    reader.join();
+    CHECK_TRUE(result == hal::SerialResult::ok);
+    CHECK_TRUE(received == sent);
 }
 
 TEST(SerialPort, ReportsThatTheOtherEndIsGone) {

@@ -6,7 +6,8 @@
 //   step.4x7-equal.<associator>         the same with one accuracy for all, as Lee and Kim (2000) have it
 //   growth.<tracks>x<detections>.<associator>   tracks apart, one detection each, the rest is clutter
 //   cluster.<tracks>x<detections>.<associator>  all in one cluster
-//   tracker.<mean|worst>.<associator>   the whole step of a tracker with 16 confirmed tracks, as many tentative
+//   tracker.<mean|worst>.<associator>   the whole step of a tracker with 16 confirmed tracks, as many
+//   tentative
 //                                       ones as fit, and 64 detections
 #include <array>
 #include <cstddef>
@@ -107,8 +108,8 @@ void make_road(std::size_t tracks, std::size_t detections) {
         const int i = static_cast<int>(j);
         if (j < tracks) {
             const Vec2<Real>& x = scene.track[j].x;
-            scene.measurement[scene.measurements++] =
-                detection(x[0] + x[1] * kMotion.period_s + centi(random(20)), x[1] + centi(random(10)), i % 24);
+            scene.measurement[scene.measurements++] = detection(
+                x[0] + x[1] * kMotion.period_s + centi(random(20)), x[1] + centi(random(10)), i % 24);
         } else {
             scene.measurement[scene.measurements++] =
                 detection(centi(random(16000)), centi(random(6000) - 3000), i % 24);
@@ -119,6 +120,7 @@ void make_road(std::size_t tracks, std::size_t detections) {
 /// Runs a step of the scene; adds what its parts took to `spent`. The start of the steps is always the same.
 void run_step(const Gate<Real>& gate, Associator associator, std::array<std::uint32_t, kParts>& spent) {
     const std::span<const Measurement<Real>> measurements(scene.measurement.data(), scene.measurements);
+    const std::uint64_t all = ~std::uint64_t{0} >> (64 - scene.measurements);
     track = scene.track;
     std::array<Real, kMaxConfirmed> existence;
     std::array<RankInput<Real>, kMaxConfirmed> rank;
@@ -133,7 +135,7 @@ void run_step(const Gate<Real>& gate, Associator associator, std::array<std::uin
     }
     spent[predicting] += target::independent_ns();
     for (std::size_t t = 0; t < scene.tracks; ++t) {
-        gate.fill(row[t], track[t].x, track[t].covariance, measurements, ~std::uint64_t{0}, false);
+        gate.fill(row[t], track[t].x, track[t].covariance, measurements, all, false);
         if (uses_rank(associator)) rank[t] = gate.rank_input(row[t], track[t], measurements);
     }
     spent[gating] += target::independent_ns();
@@ -167,7 +169,10 @@ void measure(std::string_view kind, std::string_view variant, Associator associa
         sum += spent[part];
         if (!by_part) continue;
         firmware::TextLine line = line_of(kind, scene.tracks, scene.measurements, variant, associator);
-        line.text(".").text(kPartNames[part]).text(" ").number(spent[part] / static_cast<std::uint32_t>(repetitions));
+        line.text(".")
+            .text(kPartNames[part])
+            .text(" ")
+            .number(spent[part] / static_cast<std::uint32_t>(repetitions));
         target::console.line(line.view());
     }
     firmware::TextLine line = line_of(kind, scene.tracks, scene.measurements, variant, associator);
@@ -193,9 +198,9 @@ void measure_tracker(Associator associator) {
     for (std::uint32_t frame = 0; frame < kFrames; ++frame) {
         for (std::size_t j = 0; j < kMaxMeasurements; ++j) {
             const int i = static_cast<int>(j);
-            scene.measurement[j] = j < kMaxConfirmed
-                                       ? detection(Real(10 + 9 * i) + centi(random(20)), centi(random(10)), i % 8)
-                                       : detection(centi(random(16000)), centi(random(6000) - 3000), 8 + i % 16);
+            scene.measurement[j] =
+                j < kMaxConfirmed ? detection(Real(10 + 9 * i) + centi(random(20)), centi(random(10)), i % 8)
+                                  : detection(centi(random(16000)), centi(random(6000) - 3000), 8 + i % 16);
         }
         target::independent_ns();
         tracker.step(scene.measurement);

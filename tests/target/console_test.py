@@ -67,7 +67,7 @@ def main():
         console.expect(r"cell: range 4996 mm, range rate 950 mm/s")
         console.expect(r"memory: rom \d+, static ram \d+, stack reserved \d+ bytes")
         console.expect(r"last run ended by: power on")
-        console.expect(r"t \d+ ms \w+, faults 0x[0-9a-f]{8}, detections \d+, tracks \d+, warning \w[\w ]*, can \w")
+        console.expect(r"t \d+ ms failed: frame missing \+ ego stale( \+ can error)?, detections \d+, tracks \d+, warning \w[\w ]*, can \w")
         console.type("h")
         console.expect("s status, t tracks, c counters, h help")
 

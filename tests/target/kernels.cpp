@@ -7,6 +7,7 @@
 
 #include "can/transmitter.hpp"
 #include "dsp/detect.hpp"
+#include "dsp/log2.hpp"
 #include "dsp/sine.hpp"
 #include "firmware/radar.hpp"
 #include "tests/target/bench.hpp"
@@ -102,7 +103,6 @@ dsp::BeatFrame four;
 dsp::BeatFrame crowded;
 dsp::Workspace workspace;
 dsp::DetectionList detections;
-dsp::CellMask maxima;
 dsp::CellMask hits;
 std::array<dsp::Spectrum64, kRepeats> spectra;
 
@@ -143,10 +143,9 @@ void measure_transforms() {
 
 /// Local maxima and OS-CFAR of the map in the workspace.
 void measure_cfar(std::string_view name) {
-    measure(name, kFrameRepeats, [](std::uint32_t) {
-        dsp::local_maxima(workspace.map, kConfig.cfar.first_range_cell, maxima);
-        dsp::os_cfar(workspace.map, workspace.cfar, maxima, hits);
-    });
+    const auto level = static_cast<std::uint16_t>(workspace.noise_level - dsp::kLogOne * 5 / 4);
+    measure(name, kFrameRepeats,
+            [level](std::uint32_t) { dsp::cfar_peaks(workspace.map, workspace.cfar, level, hits); });
 }
 
 void measure_frame(const dsp::BeatFrame& frame, std::string_view cfar, std::string_view peaks,
@@ -174,6 +173,7 @@ void measure_frames() {
     measure_frame(crowded, "cfar.crowded", "extract_peaks.crowded", "detect.crowded");
     expect_detections(dsp::kMaxDetections - 4, dsp::kMaxDetections);
     make_worst(workspace.map, workspace.cfar.threshold());
+    workspace.noise_level = dsp::noise_level(workspace.map, kConfig.cfar.first_range_cell);
     measure_cfar("cfar.adversarial");
 }
 

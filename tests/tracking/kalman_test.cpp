@@ -11,6 +11,7 @@
 
 using dsp::Real;
 using tracking::constant;
+using tracking::Innovation;
 using tracking::Ldl;
 using tracking::Mat2;
 using tracking::MotionModel;
@@ -76,15 +77,22 @@ void agrees_with_dense_algebra(double tolerance) {
         const Mat2<S> ps = scalars<S>(p);
         const Vec2<S> rs(scalar<S>(r[0]), scalar<S>(r[1]));
         const Vec2<S> nus(scalar<S>(nu[0]), scalar<S>(nu[1]));
-        const Ldl<S> ldl(tracking::innovation_covariance(ps, rs));
-        CHECK(ldl.valid());
-        const S distance2 = ldl.distance2(nus);
+        const Innovation<S> innovation(ps, rs);
+        CHECK(innovation.valid());
+        const S distance2 = innovation.distance2(nus);
         DOUBLES_EQUAL(d2, value(distance2), 200 * tolerance * (1 + d2));
         const double log_density = -0.5 * d2 - std::log(2 * M_PI) - 0.5 * std::log(s.determinant());
+        DOUBLES_EQUAL(log_density, value(innovation.log_density(distance2)), 200 * tolerance * (1 + d2));
+        const Eigen::Vector2d move = k * nu;
+        const Vec2<S> moved = innovation.move(nus);
+        for (int i = 0; i < 2; ++i)
+            DOUBLES_EQUAL(move[i], value(moved[i]), 20 * tolerance * (1 + nu.cwiseAbs().maxCoeff()));
+        CHECK(largest_difference(joseph, innovation.posterior()) < 20 * tolerance);
+
+        const Ldl<S> ldl(tracking::innovation_covariance(ps, rs));
+        CHECK(ldl.valid());
+        DOUBLES_EQUAL(d2, value(ldl.distance2(nus)), 200 * tolerance * (1 + d2));
         DOUBLES_EQUAL(log_density, value(ldl.log_density(distance2)), 200 * tolerance * (1 + d2));
-        const Mat2<S> ks = tracking::gain(ps, ldl);
-        CHECK(largest_difference(k, ks) < 200 * tolerance * (1 + k.cwiseAbs().maxCoeff()));
-        CHECK(largest_difference(joseph, tracking::posterior_covariance(ps, ks, rs)) < 20 * tolerance);
     }
 }
 }  // namespace
@@ -135,9 +143,9 @@ TEST(Kalman, FixedPointCovarianceStaysPositiveAndOnTheRiccatiPath) {
             const Eigen::Matrix2d r = Eigen::Vector2d(value(r0), value(r1)).asDiagonal();
             const Eigen::Matrix2d k = reference * (reference + r).inverse();
             reference = ((Eigen::Matrix2d::Identity() - k) * reference).eval();
-            const Ldl<Real> ldl(tracking::innovation_covariance<Real>(p, {r0, r1}));
-            CHECK(ldl.valid());
-            p = tracking::posterior_covariance<Real>(p, tracking::gain(p, ldl), {r0, r1});
+            const Innovation<Real> innovation(p, {r0, r1});
+            CHECK(innovation.valid());
+            p = innovation.posterior();
         }
         CHECK(p(0, 1) == p(1, 0));
         CHECK(Ldl<Real>(p).valid());
@@ -154,6 +162,15 @@ TEST(Kalman, SingularMatrixIsSaidToBeSingular) {
     m << Real(-1), Real(0), Real(0), Real(1);
     CHECK_FALSE(Ldl<Real>(m).valid());
     CHECK_FALSE(Ldl<double>(Mat2<double>::Zero()).valid());
+    const Vec2<Real> none(Real(0), Real(0));
+    CHECK_FALSE(Innovation<Real>(Mat2<Real>::Zero(), none).valid());
+    CHECK_FALSE(Innovation<Real>(m, none).valid());
+    m << Real(1), Real(2), Real(2), Real(4);
+    CHECK_FALSE(Innovation<Real>(m, none).valid());
+    m << Real::from_raw(1), Real(500), Real(500), Real::from_raw(1);
+    CHECK_FALSE(Innovation<Real>(m, none).valid());
+    m << Real::max(), Real(0), Real(0), Real::max();
+    CHECK(Innovation<Real>(m, {Real::max(), Real::max()}).valid());
 }
 
 TEST(Kalman, FarInnovationsSaturateAboveAnyGate) {

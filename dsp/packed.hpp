@@ -1,0 +1,226 @@
+/// Two 16-bit numbers in a word, as the DSP instructions of Cortex-M4, M7 and R take them; elsewhere a twin
+/// with the same bits. Lane 0 is bits 15..0, lane 1 bits 31..16: the real and the imaginary part of a
+/// Complex16.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#if defined(__ARM_FEATURE_SIMD32) && defined(__ARM_FEATURE_DSP)
+#include <arm_acle.h>
+#define DSP_PACKED_INTRINSICS 1
+#else
+#define DSP_PACKED_INTRINSICS 0
+#endif
+
+namespace dsp::packed {
+
+using Pair = std::uint32_t;
+
+constexpr std::int32_t lane0(Pair a) {
+    return static_cast<std::int16_t>(a & 0xFFFFU);
+}
+constexpr std::int32_t lane1(Pair a) {
+    return static_cast<std::int16_t>(a >> 16);
+}
+constexpr Pair pack(std::int32_t lane_0, std::int32_t lane_1) {
+    return (static_cast<std::uint32_t>(lane_0) & 0xFFFFU) | static_cast<std::uint32_t>(lane_1) << 16;
+}
+/// Two samples next to each other in memory; boards and PCs alike are little-endian.
+template <class T>
+Pair load(const T* samples) {
+    static_assert(sizeof(T) == 2 && std::endian::native == std::endian::little);
+    Pair pair;
+    std::memcpy(&pair, samples, sizeof pair);
+    return pair;
+}
+constexpr Pair both(std::uint16_t a) {
+    return a | std::uint32_t{a} << 16;
+}
+constexpr Pair swap(Pair a) {
+    return a << 16 | a >> 16;
+}
+
+/// The instructions in plain arithmetic, named as the functions below. Lanes and 32-bit sums wrap.
+namespace portable {
+constexpr std::int32_t wrap(std::int64_t v) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(v & 0xFFFFFFFF));
+}
+constexpr std::int64_t product(std::int32_t a, std::int32_t b) {
+    return std::int64_t{a} * b;
+}
+constexpr Pair add(Pair a, Pair b) {
+    return pack(lane0(a) + lane0(b), lane1(a) + lane1(b));
+}
+constexpr Pair sub(Pair a, Pair b) {
+    return pack(lane0(a) - lane0(b), lane1(a) - lane1(b));
+}
+constexpr Pair half_add(Pair a, Pair b) {
+    return pack((lane0(a) + lane0(b)) >> 1, (lane1(a) + lane1(b)) >> 1);
+}
+constexpr Pair half_sub(Pair a, Pair b) {
+    return pack((lane0(a) - lane0(b)) >> 1, (lane1(a) - lane1(b)) >> 1);
+}
+constexpr Pair add_j(Pair a, Pair b) {
+    return pack(lane0(a) - lane1(b), lane1(a) + lane0(b));
+}
+constexpr Pair sub_j(Pair a, Pair b) {
+    return pack(lane0(a) + lane1(b), lane1(a) - lane0(b));
+}
+constexpr Pair half_add_j(Pair a, Pair b) {
+    return pack((lane0(a) - lane1(b)) >> 1, (lane1(a) + lane0(b)) >> 1);
+}
+constexpr Pair half_sub_j(Pair a, Pair b) {
+    return pack((lane0(a) + lane1(b)) >> 1, (lane1(a) - lane0(b)) >> 1);
+}
+constexpr std::int32_t clamp(std::int32_t v) {
+    return v > 32767 ? 32767 : (v < -32768 ? -32768 : v);
+}
+constexpr Pair saturated_add_j(Pair a, Pair b) {
+    return pack(clamp(lane0(a) - lane1(b)), clamp(lane1(a) + lane0(b)));
+}
+constexpr Pair saturated_sub_j(Pair a, Pair b) {
+    return pack(clamp(lane0(a) + lane1(b)), clamp(lane1(a) - lane0(b)));
+}
+constexpr Pair largest(Pair a, Pair b) {
+    return pack(lane0(a) > lane0(b) ? lane0(a) : lane0(b), lane1(a) > lane1(b) ? lane1(a) : lane1(b));
+}
+constexpr Pair smallest(Pair a, Pair b) {
+    return pack(lane0(a) < lane0(b) ? lane0(a) : lane0(b), lane1(a) < lane1(b) ? lane1(a) : lane1(b));
+}
+constexpr Pair pack_low(std::int32_t lane_0, std::int32_t lane_1) {
+    return pack(lane_0, lane_1);
+}
+constexpr Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
+    return pack(lane_0 >> 16, lane_1 >> 16);
+}
+constexpr Pair at_least(Pair a, Pair b) {
+    return ((a & 0xFFFFU) >= (b & 0xFFFFU) ? 1U : 0U) | (a >> 16 >= b >> 16 ? 0x10000U : 0U);
+}
+constexpr std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane0(a), lane0(b)) + product(lane1(a), lane1(b)) + sum);
+}
+constexpr std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane0(a), lane0(b)) - product(lane1(a), lane1(b)) + sum);
+}
+constexpr std::int32_t dot_cross(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane0(a), lane1(b)) + product(lane1(a), lane0(b)) + sum);
+}
+constexpr std::int32_t multiply_00(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane0(a), lane0(b)) + sum);
+}
+constexpr std::int32_t multiply_10(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane1(a), lane0(b)) + sum);
+}
+constexpr std::int32_t scale_0(std::int32_t a, Pair b) {
+    return static_cast<std::int32_t>(product(a, lane0(b)) >> 16);
+}
+constexpr std::int32_t scale_1(std::int32_t a, Pair b) {
+    return static_cast<std::int32_t>(product(a, lane1(b)) >> 16);
+}
+}  // namespace portable
+
+#if DSP_PACKED_INTRINSICS
+/// Lane by lane, wrapping.
+inline Pair add(Pair a, Pair b) {
+    return static_cast<Pair>(__sadd16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+inline Pair sub(Pair a, Pair b) {
+    return static_cast<Pair>(__ssub16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+/// (a + b) / 2 lane by lane, rounded down; cannot overflow.
+inline Pair half_add(Pair a, Pair b) {
+    return static_cast<Pair>(__shadd16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+inline Pair half_sub(Pair a, Pair b) {
+    return static_cast<Pair>(__shsub16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+/// a + j b and a - j b, wrapping.
+inline Pair add_j(Pair a, Pair b) {
+    return static_cast<Pair>(__sasx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+inline Pair sub_j(Pair a, Pair b) {
+    return static_cast<Pair>(__ssax(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+/// Half of them, rounded down.
+inline Pair half_add_j(Pair a, Pair b) {
+    return static_cast<Pair>(__shasx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+inline Pair half_sub_j(Pair a, Pair b) {
+    return static_cast<Pair>(__shsax(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+/// a + j b and a - j b, clamped to 16 bits.
+inline Pair saturated_add_j(Pair a, Pair b) {
+    return static_cast<Pair>(__qasx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+inline Pair saturated_sub_j(Pair a, Pair b) {
+    return static_cast<Pair>(__qsax(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+/// Lane by lane, of signed numbers.
+inline Pair largest(Pair a, Pair b) {
+    (void)__ssub16(static_cast<int16x2_t>(a),
+                   static_cast<int16x2_t>(b));  // its flags are what __sel looks at
+    return __sel(a, b);
+}
+inline Pair smallest(Pair a, Pair b) {
+    (void)__ssub16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b));
+    return __sel(b, a);
+}
+/// The low and the high halves of two words. No intrinsic exists, and gcc 12 does not find the instructions.
+inline Pair pack_low(std::int32_t lane_0, std::int32_t lane_1) {
+    Pair result;
+    asm("pkhbt %0, %1, %2, lsl #16" : "=r"(result) : "r"(lane_0), "r"(lane_1));
+    return result;
+}
+inline Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
+    Pair result;
+    asm("pkhtb %0, %1, %2, asr #16" : "=r"(result) : "r"(lane_1), "r"(lane_0));
+    return result;
+}
+/// One in each lane where a >= b, both unsigned; else zero.
+inline Pair at_least(Pair a, Pair b) {
+    (void)__usub16(a, b);  // sets a flag for each byte that does not borrow
+    return __sel(0x00010001U, 0U);
+}
+/// sum + a0 b0 + a1 b1
+inline std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
+    return __smlad(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
+}
+/// sum + a0 b0 - a1 b1
+inline std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
+    return __smlsd(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
+}
+/// sum + a0 b1 + a1 b0
+inline std::int32_t dot_cross(Pair a, Pair b, std::int32_t sum) {
+    return __smladx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
+}
+/// sum + a0 b0 and sum + a1 b0
+inline std::int32_t multiply_00(Pair a, Pair b, std::int32_t sum) {
+    return __smlabb(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), sum);
+}
+inline std::int32_t multiply_10(Pair a, Pair b, std::int32_t sum) {
+    return __smlatb(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), sum);
+}
+/// a times a lane of b, its upper 32 of 48 bits, rounded down
+inline std::int32_t scale_0(std::int32_t a, Pair b) {
+    return __smlawb(a, static_cast<std::int32_t>(b), 0);
+}
+inline std::int32_t scale_1(std::int32_t a, Pair b) {
+    return __smlawt(a, static_cast<std::int32_t>(b), 0);
+}
+#else
+using namespace portable;
+#endif
+
+/// As wide as the widest magnitude of the two lanes, in bits 16..31 and (with bit 0 wrong) 0..15: for a cheap
+/// "or" over many pairs.
+constexpr Pair spread(Pair a) {
+    return a ^ a << 1;
+}
+/// Magnitude bits of an "or" of spread(): every lane is within -2^bits .. 2^bits - 1; 1..15.
+constexpr int magnitude_bits(Pair spreads) {
+    return static_cast<int>(std::bit_width((spreads >> 16) | (spreads & 0xFFFFU) | 2U)) - 1;
+}
+
+}  // namespace dsp::packed

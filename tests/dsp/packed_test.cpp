@@ -1,0 +1,94 @@
+// Expected values: plain arithmetic on the lanes, written out here. On a board the packed instructions
+// themselves are compared with the portable twin by the recorded frames, whose CAN bytes must equal the PC's.
+#include <array>
+#include <cstdint>
+
+#include "dsp/packed.hpp"
+#include "tests/bench/dsp_reference.hpp"
+
+#include <CppUTest/TestHarness.h>
+
+using namespace dsp::packed;
+
+namespace {
+
+std::int64_t wrap16(std::int64_t v) {
+    return static_cast<std::int16_t>(static_cast<std::uint16_t>(v & 0xFFFF));
+}
+std::int64_t wrap32(std::int64_t v) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(v & 0xFFFFFFFF));
+}
+std::int64_t floor_half(std::int64_t v) {
+    return v >= 0 ? v / 2 : -((1 - v) / 2);
+}
+std::int64_t clamp16(std::int64_t v) {
+    return v > 32767 ? 32767 : (v < -32768 ? -32768 : v);
+}
+
+}  // namespace
+
+TEST_GROUP(Packed){
+    void lanes(std::int64_t expected0, std::int64_t expected1, Pair got){LONGS_EQUAL(expected0, lane0(got));
+LONGS_EQUAL(expected1, lane1(got));
+}
+
+void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
+    const Pair a = pack(a0, a1);
+    const Pair b = pack(b0, b1);
+    lanes(a0, a1, a);
+    lanes(wrap16(a0 + b0), wrap16(a1 + b1), add(a, b));
+    lanes(wrap16(a0 - b0), wrap16(a1 - b1), sub(a, b));
+    lanes(floor_half(a0 + b0), floor_half(a1 + b1), half_add(a, b));
+    lanes(floor_half(a0 - b0), floor_half(a1 - b1), half_sub(a, b));
+    // (a0 + j a1) +- j (b0 + j b1)
+    lanes(wrap16(a0 - b1), wrap16(a1 + b0), add_j(a, b));
+    lanes(wrap16(a0 + b1), wrap16(a1 - b0), sub_j(a, b));
+    lanes(floor_half(a0 - b1), floor_half(a1 + b0), half_add_j(a, b));
+    lanes(floor_half(a0 + b1), floor_half(a1 - b0), half_sub_j(a, b));
+    lanes(clamp16(a0 - b1), clamp16(a1 + b0), saturated_add_j(a, b));
+    lanes(clamp16(a0 + b1), clamp16(a1 - b0), saturated_sub_j(a, b));
+    lanes(std::max(a0, b0), std::max(a1, b1), largest(a, b));
+    lanes(std::min(a0, b0), std::min(a1, b1), smallest(a, b));
+    lanes(a1, a0, swap(a));
+    const auto product = [](std::int64_t x, std::int64_t y) { return x * y; };
+    LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1) + sum), dot(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a0, b0) - product(a1, b1) + sum), dot_minus(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a0, b1) + product(a1, b0) + sum), dot_cross(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a0, b0) + sum), multiply_00(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a1, b0) + sum), multiply_10(a, b, sum));
+    LONGS_EQUAL((product(sum, b0) - (product(sum, b0) & 0xFFFF)) / 65536, scale_0(sum, b));
+    LONGS_EQUAL((product(sum, b1) - (product(sum, b1) & 0xFFFF)) / 65536, scale_1(sum, b));
+    lanes(wrap16(sum), wrap16(~sum), pack_low(sum, ~sum));
+    lanes(wrap16(sum / 65536 - (sum % 65536 < 0 ? 1 : 0)), a1, pack_high(sum, static_cast<std::int32_t>(a)));
+}
+}
+;
+
+TEST(Packed, EveryCombinationOfEdges) {
+    constexpr std::array<int, 8> kEdges{-32768, -32767, -16384, -1, 0, 1, 16384, 32767};
+    for (const int a0 : kEdges) {
+        for (const int a1 : kEdges) {
+            for (const int b0 : kEdges) {
+                for (const int b1 : kEdges) check(a0, a1, b0, b1, a0 * 65536 + b1);
+            }
+        }
+    }
+}
+
+TEST(Packed, RandomNumbers) {
+    bench::Random random{5};
+    const auto draw = [&random] { return static_cast<int>(static_cast<std::int16_t>(random() & 0xFFFF)); };
+    for (int i = 0; i < 20'000; ++i) {
+        check(draw(), draw(), draw(), draw(),
+              static_cast<std::int32_t>(static_cast<std::uint32_t>(random())));
+    }
+}
+
+TEST(Packed, MagnitudeBitsCoverEveryValue) {
+    for (int v = -32768; v <= 32767; ++v) {
+        int bits = 1;
+        while (v < -(1 << bits) || v > (1 << bits) - 1) ++bits;
+        LONGS_EQUAL(bits, magnitude_bits(spread(pack(v, 0))));
+        LONGS_EQUAL(bits, magnitude_bits(spread(pack(0, v))));
+    }
+}
