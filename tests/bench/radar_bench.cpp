@@ -91,15 +91,9 @@ int main(int argc, char** argv) {
         "signal processing against double precision and the Cramer-Rao bound, tracks against the truth");
     std::string part = "all";
     accuracy_command
-<<<<<<< HEAD
-        ->add_option(
-            "--only", part,
-            "dsp: signal processing; association: solvers against listing; system: scenarios and recordings")
-=======
         ->add_option("--only", part,
                      "dsp: signal processing; association: solvers against listing; system: scenarios "
                      "and recordings")
->>>>>>> main
         ->check(CLI::IsMember({"all", "dsp", "association", "system"}));
     std::string recordings = RADAR_RECORDINGS_DIR;
     accuracy_command
