@@ -24,8 +24,8 @@ STATUS = 0x400  # first frame of every cycle that the radar sends
 FRAME_BYTES = 8192
 RECORD = struct.Struct("<HBB8s")
 MEMORY = struct.Struct("<4I")
-EXIT_CODES = {2: "frames.bin or bus.bin missing", 3: "bus.bin ended early", 4: "cannot write", 5: "CAN frames dropped", 6: "tracker.txt names no tracker of this image",
-              emulator.TIMEOUT_EXIT_CODE: "not finished in time"}
+EXIT_CODES = {2: "frames.bin or bus.bin missing", 3: "bus.bin ended early", 4: "cannot write", 5: "CAN frames dropped",
+              6: "tracker.txt names no tracker of this image", emulator.TIMEOUT_EXIT_CODE: "not finished in time"}
 
 
 def read_log(path):
@@ -142,7 +142,8 @@ def main():
     totals = [sum(row) for row in instructions]
     columns = list(zip(*instructions))
     result = {
-        "board": arguments.board, "scenario": arguments.scenario, "tracker": arguments.tracker, "frames": len(cycles),
+        "board": arguments.board, "scenario": arguments.scenario, "tracker": arguments.tracker,
+        "frames": len(cycles),
         "can_frames": sum(len(c) for c in expected), "identical": difference is None,
         "instructions": {name: {"mean": round(sum(c) / len(c)), "worst": max(c)} for name, c in zip(STAGES, columns)},
         "loop": {"mean": round(sum(totals) / len(totals)), "worst": max(totals)}, **memory,
@@ -150,7 +151,8 @@ def main():
     if arguments.json:
         with open(arguments.json, "w") as out:
             json.dump(result, out, indent=1)
-    print(f"{arguments.board} {arguments.scenario} {arguments.tracker or ''}: {result['frames']} frames, {result['can_frames']} CAN frames, "
+    name = " ".join(filter(None, (arguments.board, arguments.scenario, arguments.tracker)))
+    print(f"{name}: {result['frames']} frames, {result['can_frames']} CAN frames, "
           f"{'identical' if difference is None else 'DIFFERENT'}; loop {result['loop']['mean']} instructions mean, "
           f"{result['loop']['worst']} worst; stack {memory['stack_used']} bytes")
     for name in STAGES:
