@@ -88,38 +88,45 @@ Patch align(const Spectrum& spectrum, const Cell& peak, bool mirror_range, bool 
     const int down = static_cast<int>(std::bit_width(power)) - Patch::kUnitBits;
     Patch patch;
     patch.log2_unit = log2_q10(power) - down * kLogOne;
+    packed::Pair turn = packed::pack(re, im);
+    packed::Pair turn_and_change_sign = packed::pack(-re, -im);
     const int range_step = mirror_range ? -1 : 1;
     const int doppler_step = mirror_doppler ? -1 : 1;
-    for (int i = 0; i < kTaps; ++i) {
-        const int range = peak.range + range_step * (i - kReach);
+    int range = peak.range - range_step * kReach;
+    for (std::size_t i = 0; i < kTaps; ++i, range += range_step) {
         // A real signal's spectrum below cell 0: X[-r, -d] = conj X[r, d]. Above the last row it is not kept.
         const bool below = range < 0;
-        if (range >= kRangeCells) continue;
         const auto row = static_cast<std::size_t>(below ? -range : range);
-        const int row_down = down + spectrum.row_exponent[peak_row] - spectrum.row_exponent[row];
-        if (row_down > 30) continue;
-        const packed::Pair turn = packed::pack(re, below ? -im : im);
-        const packed::Pair turn_and_change_sign = packed::pack(-re, below ? im : -im);
-        const std::array<packed::Pair, 2> turns =
-            i % 2 == 0 ? std::array{turn, turn_and_change_sign} : std::array{turn_and_change_sign, turn};
-        const Complex16* cells = spectrum.row[row].data();
-        const int first =
-            below ? -peak.doppler + doppler_step * kReach : peak.doppler - doppler_step * kReach;
-        const int step = below ? -doppler_step : doppler_step;
-        const auto place = [&](std::size_t j) {
-            const auto column = static_cast<std::size_t>(first + step * static_cast<int>(j));
-            const Complex16 x = cells[column & (kDopplerCells - 1)];
-            std::int32_t v = packed::dot(packed::pack(x.re, x.im), turns[j % 2], 0);
-            if (row_down >= 0) {
-                v >>= row_down;
-            } else {  // a row with another, far stronger target
-                const int up = std::min(-row_down, 15);
-                v = std::clamp<std::int32_t>(v, -(32768 >> up), 32767 >> up) * (1 << up);
-            }
-            patch.along_doppler[static_cast<std::size_t>(i)][j] = saturate16(v);
-            patch.along_range[j][static_cast<std::size_t>(i)] = saturate16(v);
-        };
-        for (std::size_t j = 0; j < kTaps; ++j) place(j);
+        if (row < kRangeCells) {
+            const int row_down = down + spectrum.row_exponent[peak_row] - spectrum.row_exponent[row];
+            const int shift_down = std::clamp(row_down, 0, 31);
+            const int shift_up = std::clamp(-row_down, 0, 15);  // a row with another, far stronger target
+            const Complex16* cells = spectrum.row[row].data();
+            int column = below ? -peak.doppler + doppler_step * kReach : peak.doppler - doppler_step * kReach;
+            const int column_step = below ? -doppler_step : doppler_step;
+            const auto place = [&](std::size_t j, packed::Pair rotation) {
+                const packed::Pair x =
+                    packed::load(&cells[static_cast<std::size_t>(column) & (kDopplerCells - 1)].re);
+                const std::int32_t aligned = packed::dot(x, rotation, 0) >> shift_down;
+                const auto cell =
+                    static_cast<std::int16_t>(packed::clamp(packed::clamp(aligned) * (1 << shift_up)));
+                patch.along_doppler[i][j] = cell;
+                patch.along_range[j][i] = cell;
+                column += column_step;
+            };
+            const auto conjugate = [below](packed::Pair x) {
+                return below ? packed::pack(packed::lane0(x), -packed::lane1(x)) : x;
+            };
+            const packed::Pair even = conjugate(turn);
+            const packed::Pair odd = conjugate(turn_and_change_sign);
+            static_assert(kTaps == 5);
+            place(0, even);
+            place(1, odd);
+            place(2, even);
+            place(3, odd);
+            place(4, even);
+        }
+        std::swap(turn, turn_and_change_sign);
     }
     return patch;
 }

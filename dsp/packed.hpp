@@ -209,6 +209,12 @@ inline std::int32_t scale_0(std::int32_t a, Pair b) {
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
     return __smlawt(a, static_cast<std::int32_t>(b), 0);
 }
+/// Clamped to 16 bits.
+inline std::int32_t clamp(std::int32_t v) {
+    std::int32_t result;
+    asm("ssat %0, #16, %1" : "=r"(result) : "r"(v));  // the compiler's __ssat changes signs on the way
+    return result;
+}
 #else
 using namespace portable;
 #endif
