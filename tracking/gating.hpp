@@ -120,11 +120,12 @@ class Gate {
     }
 
     /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`. Of more
-    /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess`: of each measurement,
-    /// ln of the clutter density there over config().clutter_density; empty: 0.
+    /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess(z)`: ln of the clutter
+    /// density at z over config().clutter_density, asked of measurements in the gate only.
+    template <class LogExcess>
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
               std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured,
-              std::span<const S> log_excess = {}) const {
+              LogExcess log_excess) const {
         const SensorLogs<S>& logs = sensor(obscured);
         row.count = 0;
         row.dropped = 0;
@@ -136,10 +137,14 @@ class Gate {
             S distance2(0);
             S log_density(0);
             if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) return;
-            const S excess = log_excess.empty() ? S(0) : log_excess[index];
-            insert(row,
-                   {static_cast<std::uint16_t>(index), logs.detected + log_density - excess, S(0), S(0)});
+            insert(row, {static_cast<std::uint16_t>(index), logs.detected + log_density - log_excess(m.z),
+                         S(0), S(0)});
         });
+    }
+    /// The same with clutter as expected everywhere.
+    void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
+              std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured) const {
+        fill(row, x, p, measurements, usable, obscured, [](const Vec2<S>&) { return S(0); });
     }
 
     /// The gate of a filled row for the rank-based associators: clutter expected in it, and the target's

@@ -111,7 +111,7 @@ class Tracker {
           clutter_(config.gate.clutter_density, config.gate.rate_span_mps),
           index_(config.gate.rate_span_mps),
           model_(config.modes.model()) {
-        set_start_noise();
+        set_start_motion();
     }
 
     /// One frame, one period after the last. Of more than kMaxMeasurements the first are used: give them
@@ -127,6 +127,7 @@ class Tracker {
     void reset() {
         count_ = 0;
         pending_count_ = 0;
+        old_pending_count_ = 0;
         last_id_ = 0;
         clutter_.reset();
     }
@@ -139,7 +140,7 @@ class Tracker {
         clutter_ = ClutterMap<S>(config.gate.clutter_density, config.gate.rate_span_mps);
         index_ = RateIndex<S>(config.gate.rate_span_mps);
         model_ = config.modes.model();
-        set_start_noise();
+        set_start_motion();
         reset();
     }
 
@@ -157,16 +158,35 @@ class Tracker {
   private:
     /// A measurement nobody claimed, which may start a track with one of the next frames.
     struct Pending {
-        Measurement<S> measurement;
-        std::uint8_t age = 0;  ///< frames ago
+        Vec2<S> z;
+        Vec2<S> noise;
     };
-    /// Frames between the two measurements of a start: 2, so that one miss does not delay it further.
+    /// At most two frames lie between the measurements of a start, so that one miss does not delay it
+    /// further.
     static constexpr int kStartFrames = 2;
+    /// What is the same for all starts with a pending measurement of one age.
+    struct StartMotion {
+        S time_s;
+        Mat2<S> noise;  ///< of the motion in that time
+        S fold_step_m;  ///< by how much farther a fold in range rate brings a target
+    };
+    /// A pending measurement, and how often its range rate is folded.
+    struct Start {
+        int from = -1;
+        int fold = 0;
+        S distance2 = S(0);
+    };
 
-    void set_start_noise() {
+    void set_start_motion() {
         Mat2<S> p = Mat2<S>::Zero();
-        for (Mat2<S>& noise : start_noise_) noise = p = predict_covariance(p, config_.motion);
+        S time_s(0);
+        for (StartMotion& m : start_motion_) {
+            p = predict_covariance(p, config_.motion);
+            time_s += config_.motion.period_s;
+            m = {time_s, p, time_s * config_.gate.rate_span_mps};
+        }
     }
+    [[nodiscard]] int age_of_pending(std::size_t i) const { return i < old_pending_count_ ? 2 : 1; }
 
     static constexpr std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
 
@@ -196,7 +216,8 @@ class Tracker {
                          S& existence, std::span<const Measurement<S>> measurements);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
-    bool best_start(const Pending& from, const Measurement<S>& to, S& distance2, Track<S>& track) const;
+    void consider_start(std::size_t from, const Vec2<S>& z, const Vec2<S>& noise, Start& best) const;
+    [[nodiscard]] Mat2<S> start_covariance(const Vec2<S>& noise, const StartMotion& motion) const;
     /// The configured prior, its odds lowered as clutter is denser than expected; not so low as to be
     /// deleted.
     [[nodiscard]] S existence_of_start(S log_excess) const {
@@ -219,16 +240,16 @@ class Tracker {
     Gate<S> gate_;
     ClutterMap<S> clutter_;
     RateIndex<S> index_;  // of the frame's measurements, then of the pending ones, then of the tracks
-    std::array<S, kMaxMeasurements> log_excess_{};  // of the frame's measurements
     std::array<Track<S>, kMaxTracks> track_{};
     std::array<AssociationRow<S>, kMaxConfirmed> row_{};
     AssociatorWorkspace<S> work_{};
     ImmModel<S, 2, 2> model_;
     std::array<ImmState<S, 2, 2>, kHasModes ? kMaxTracks : 0> modes_{};  // of track_, in the same order
-    std::array<Mat2<S>, kStartFrames> start_noise_;  // of the motion between the two measurements of a start
-    std::array<Pending, kMaxMeasurements> pending_{};
+    std::array<StartMotion, kStartFrames> start_motion_;  // by age of the pending measurement, from 1
+    std::array<Pending, kMaxMeasurements> pending_{};     // those of the frame before the last first
     int count_ = 0;
-    int pending_count_ = 0;
+    std::size_t pending_count_ = 0;
+    std::size_t old_pending_count_ = 0;
     std::uint8_t last_id_ = 0;
 };
 static_assert(kMaxTentative <= kMaxConfirmed, "row_ serves both in turn");
@@ -253,7 +274,6 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
     for (std::size_t i = 0; i < measurements.size(); ++i) {
         const bool use = (free & bit(i)) != 0;
         index_.add(use ? measurements[i].z[1] : S(0), use ? measurements[i].variance[1] : S(0));
-        log_excess_[i] = (free & bit(i)) != 0 ? clutter_.log_excess(measurements[i].z) : S(0);
     }
     predict();
     free &= ~associate_and_update(true, measurements, free, report);
@@ -310,11 +330,12 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         AssociationRow<S>& row = row_[rows];
         const bool hidden = confirmed && obscured(t);
         const S reach = gate_.rate_reach(t.covariance(1, 1), index_.largest_variance(), hidden);
-        const bool count_clutter = config_.gate.nonparametric;
         gate_.fill(row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], reach), hidden,
-                   count_clutter ? std::span<const S>{} : std::span<const S>(log_excess_));
+                   [&](const Vec2<S>& z) {
+                       return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z);
+                   });
         S counted(0);
-        if (count_clutter) {
+        if (config_.gate.nonparametric) {
             counted = gate_.log_counted_excess(row, t, measurements);
             for (Candidate<S>& c : row.candidates()) c.log_ratio -= counted;
         }
@@ -399,46 +420,47 @@ void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
     track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 8);
 }
 
-/// The track two measurements make if their range rates agree, and for one of the possible folds their range
-/// difference agrees with the range rate.
+/// Covariance after the motion of a state known as well as a measurement.
 template <class S>
-bool Tracker<S>::best_start(const Pending& from, const Measurement<S>& to, S& distance2,
-                            Track<S>& track) const {
-    const Vec2<S> from_noise = gate_.noise(from.measurement, false);
-    const Vec2<S> to_noise = gate_.noise(to, false);
-    // The folded difference of the range rates is the same for every fold: nearly all pairs fail here.
-    const S change = gate_.innovation(from.measurement.z, to.z)[1];
-    const S speed_up = config_.motion.acceleration_sigma_mps2 * config_.motion.period_s;
-    const S variance = from_noise[1] + to_noise[1] + speed_up * speed_up * static_cast<int>(from.age);
-    if (product_exceeds(change, change, config_.gate.gate, variance)) return false;
-
-    // F^age diag(from_noise) F^age' and the noise of as many frames.
-    const S t = config_.motion.period_s * static_cast<int>(from.age);
-    Mat2<S> p = start_noise_[from.age - 1U];
-    const S cross = t * from_noise[1];
-    p(0, 0) += from_noise[0] + t * cross;
+Mat2<S> Tracker<S>::start_covariance(const Vec2<S>& noise, const StartMotion& motion) const {
+    Mat2<S> p = motion.noise;
+    const S cross = motion.time_s * noise[1];
+    p(0, 0) += noise[0] + motion.time_s * cross;
     p(0, 1) += cross;
     p(1, 0) += cross;
-    p(1, 1) += from_noise[1];
+    p(1, 1) += noise[1];
+    return p;
+}
+
+/// Two measurements start a track if their range rates agree, and for one of the possible folds their range
+/// difference agrees with the range rate. Nearly all pairs fail on one of the two alone.
+template <class S>
+void Tracker<S>::consider_start(std::size_t from, const Vec2<S>& z, const Vec2<S>& noise, Start& best) const {
+    const Pending& pending = pending_[from];
+    const StartMotion& motion = start_motion_[static_cast<std::size_t>(age_of_pending(from)) - 1];
+    // The folded difference of the range rates is the same for every fold.
+    const Vec2<S> change = gate_.innovation(pending.z, z);
+    const S rate_variance = pending.noise[1] + motion.noise(1, 1) + noise[1];
+    if (product_exceeds(change[1], change[1], config_.gate.gate, rate_variance)) return;
+    const S travel = change[0] - motion.time_s * pending.z[1];
+    const S range_variance = pending.noise[0] + motion.noise(0, 0) +
+                             motion.time_s * (motion.time_s * pending.noise[1]) + noise[0];
     const S span = config_.gate.rate_span_mps;
     const int folds = span > S(0) ? 1 : 0;
-    bool found = false;
     for (int fold = -folds; fold <= folds; ++fold) {
-        Vec2<S> x(from.measurement.z[0] - config_.gate.alias_range_m * fold,
-                  from.measurement.z[1] + span * fold);
-        if (x[1] < config_.min_start_rate_mps || x[1] > config_.max_start_rate_mps) continue;
-        x[0] += t * x[1];
-        S d2(0);
+        const Vec2<S> nu(fold == 0 ? travel
+                                   : (fold > 0 ? travel - motion.fold_step_m : travel + motion.fold_step_m),
+                         change[1]);
+        if (product_exceeds(nu[0], nu[0], config_.gate.gate, range_variance)) continue;
+        const S rate = pending.z[1] + span * fold;
+        if (rate < config_.min_start_rate_mps || rate > config_.max_start_rate_mps) continue;
+        S distance2(0);
         S log_density(0);
-        if (!gate_.test(gate_.innovation(x, to.z), p, to_noise, d2, log_density)) continue;
-        if (fold != 0) d2 += config_.fold_distance2;
-        if (d2 > config_.gate.gate || (found && d2 >= distance2)) continue;
-        found = true;
-        distance2 = d2;
-        track.x = x;
-        track.covariance = p;
+        if (!gate_.test(nu, start_covariance(pending.noise, motion), noise, distance2, log_density)) continue;
+        if (fold != 0) distance2 += config_.fold_distance2;
+        if (distance2 > config_.gate.gate || (best.from >= 0 && distance2 >= best.distance2)) continue;
+        best = {static_cast<int>(from), fold, distance2};
     }
-    return found;
 }
 
 template <class S>
@@ -447,44 +469,39 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
     index_.clear();
-    for (const Pending& p : std::span(pending_).first(static_cast<std::size_t>(pending_count_)))
-        index_.add(p.measurement.z[1], p.measurement.variance[1]);
-    const S speed_up = config_.motion.acceleration_sigma_mps2 * config_.motion.period_s;
-    const S most_change = gate_.rate_variance(index_.largest_variance()) + speed_up * speed_up * kStartFrames;
+    for (const Pending& p : std::span(pending_).first(pending_count_)) index_.add(p.z[1], p.noise[1]);
+    const S most_change = index_.largest_variance() + start_motion_[kStartFrames - 1].noise(1, 1);
     for_each_bit(unclaimed, [&](std::uint32_t index) {
         const Measurement<S>& m = measurements[index];
-        Track<S> best;
-        S best_distance2(0);
-        int partner = -1;
-        const S reach = gate_.rate_reach(most_change, m.variance[1], false);
-        for_each_bit(index_.near(m.z[1], reach) & ~used, [&](std::uint32_t from) {
-            Track<S> candidate;
-            S distance2(0);
-            if (!best_start(pending_[from], m, distance2, candidate)) return;
-            if (partner >= 0 && distance2 >= best_distance2) return;
-            best = candidate;
-            best_distance2 = distance2;
-            partner = static_cast<int>(from);
-        });
-        if (partner < 0) return;
-        const Vec2<S> nu = gate_.innovation(best.x, m.z);
-        const Innovation<S> innovation(best.covariance, gate_.noise(m, false));
-        const Vec2<S> move = innovation.move(nu);
-        best.x[0] += move[0];
-        best.x[1] += move[1];
-        best.covariance = innovation.posterior();
-        if (!in_field(best) || !make_room_for_tentative(m.snr_db, report)) return;
-        used |= bit(static_cast<std::size_t>(partner));
+        const Vec2<S> noise = gate_.noise(m, false);
+        Start best;
+        for_each_bit(index_.near(m.z[1], gate_.rate_reach(most_change, noise[1], false)) & ~used,
+                     [&](std::uint32_t from) { consider_start(from, m.z, noise, best); });
+        if (best.from < 0) return;
+
+        const auto from = static_cast<std::size_t>(best.from);
+        const Pending& pending = pending_[from];
+        const StartMotion& motion = start_motion_[static_cast<std::size_t>(age_of_pending(from)) - 1];
+        Track<S> track;
+        track.x[1] = pending.z[1] + config_.gate.rate_span_mps * best.fold;
+        track.x[0] = pending.z[0] - config_.gate.alias_range_m * best.fold + motion.time_s * track.x[1];
+        const Innovation<S> innovation(start_covariance(pending.noise, motion), noise);
+        const Vec2<S> move = innovation.move(gate_.innovation(track.x, m.z));
+        track.x[0] += move[0];
+        track.x[1] += move[1];
+        track.covariance = innovation.posterior();
+        if (!in_field(track) || !make_room_for_tentative(m.snr_db, report)) return;
+        used |= bit(from);
         left &= ~bit(index);
-        best.id = next_id();
-        best.state = TrackState::tentative;
-        best.existence = existence_of_start(log_excess_[index]);
-        best.snr_db = m.snr_db;
-        best.age = pending_[static_cast<std::size_t>(partner)].age;
-        best.hits = 2;
-        best.measured = true;
-        if constexpr (kHasModes) modes_[static_cast<std::size_t>(count_)].start(best.x, best.covariance);
-        track_[static_cast<std::size_t>(count_++)] = best;
+        track.id = next_id();
+        track.state = TrackState::tentative;
+        track.existence = existence_of_start(clutter_.log_excess(m.z));
+        track.snr_db = m.snr_db;
+        track.age = static_cast<std::uint16_t>(age_of_pending(from));
+        track.hits = 2;
+        track.measured = true;
+        if constexpr (kHasModes) modes_[static_cast<std::size_t>(count_)].start(track.x, track.covariance);
+        track_[static_cast<std::size_t>(count_++)] = track;
         ++report.initiated;
     });
     remember(measurements, left, used);
@@ -496,23 +513,20 @@ template <class S>
 void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
                           std::uint64_t used) {
     clutter_.forget();
-    const int room = kMaxMeasurements - std::popcount(unclaimed);
-    int kept = 0;
-    for (int i = 0; i < pending_count_; ++i) {
-        const auto from = static_cast<std::size_t>(i);
-        const Pending& p = pending_[from];
-        if ((used & bit(from)) != 0) continue;
-        if (p.age >= kStartFrames || kept >= room) {
-            clutter_.add(p.measurement.z);
+    const auto room = kMaxMeasurements - static_cast<std::size_t>(std::popcount(unclaimed));
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < pending_count_; ++i) {
+        if ((used & bit(i)) != 0) continue;
+        if (i < old_pending_count_ || kept >= room) {
+            clutter_.add(pending_[i].z);
         } else {
-            pending_[static_cast<std::size_t>(kept++)] = {p.measurement,
-                                                          static_cast<std::uint8_t>(p.age + 1)};
+            pending_[kept++] = pending_[i];
         }
     }
-    for (std::uint64_t rest = unclaimed; rest != 0; rest &= rest - 1) {
-        pending_[static_cast<std::size_t>(kept++)] = {
-            measurements[static_cast<std::size_t>(std::countr_zero(rest))], 1};
-    }
+    old_pending_count_ = kept;
+    for_each_bit(unclaimed, [&](std::uint32_t index) {
+        pending_[kept++] = {measurements[index].z, gate_.noise(measurements[index], false)};
+    });
     pending_count_ = kept;
 }
 
