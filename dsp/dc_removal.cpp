@@ -14,8 +14,7 @@ namespace {
 
 constexpr int kMeanBits = 6;  // kSamples = 64: 64 x - sum is the deviation with 6 fraction bits
 static_assert(kSamples == 1 << kMeanBits);
-constexpr int kCodeBits = 14;
-constexpr int kLowestExponent = -13;
+constexpr int kLowestExponent = -11;
 constexpr int kCommonScale = 2;  ///< bits that a pair gives up for a scale common to the frame
 
 using packed::Pair;
@@ -44,7 +43,7 @@ DcLevels dc_levels(const BeatFrame& frame) {
         }
         const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest)));
         levels.exponent[pair] =
-            static_cast<std::int16_t>(std::max(bits - kMeanBits - kCodeBits, kLowestExponent));
+            static_cast<std::int16_t>(std::max(bits - kMeanBits - kFftInputBits, kLowestExponent));
     }
     const std::int16_t highest = *std::ranges::max_element(levels.exponent);
     for (std::int16_t& exponent : levels.exponent) {

@@ -2,153 +2,148 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstddef>
 
-#include "dsp/fixed_point.hpp"
+#include "dsp/packed.hpp"
 #include "dsp/sine.hpp"
 
 namespace dsp {
 
 namespace {
 
-struct Complex32 {
-    std::int32_t re = 0;
-    std::int32_t im = 0;
+using packed::Pair;
+
+constexpr std::int32_t kHalf = 1 << 15;  ///< rounds what pack_high cuts off
+
+/// Q15, within +-32767: a factor just below one also breaks the ties of halving, to both sides equally often.
+constexpr Pair root(int numerator) {
+    const auto narrow = [](std::int32_t q30) { return (q30 + (1 << 14)) >> 15; };
+    const std::int32_t re = narrow(cosine_q30(numerator, kFftLength));
+    const std::int32_t im = narrow(-sine_q30(numerator, kFftLength));
+    return packed::pack(std::clamp<std::int32_t>(re, -32767, 32767),
+                        std::clamp<std::int32_t>(im, -32767, 32767));
+}
+
+/// Halving rounds down: the second pass takes a quarter of a step, on average, from what its second and third
+/// level give. That is what impulses at its first two inputs would make of them, so these, negated, take the
+/// bias away. For each n, quarters of a step of the first pass's result.
+constexpr std::array<std::int32_t, 8> kBias{6, 2, 0, 0, 0, 0, 0, 0};
+
+/// What the first pass needs for samples n, n + 8 ..
+struct Column {
+    /// exp(-j 2 pi n k / 64) for k = 0, 4, 1, 5, 2, 6, 3, 7: as radix8 gives its results
+    std::array<Pair, 8> twiddle;
+    std::int32_t rounding;  ///< of the rotations
 };
 
-constexpr Complex32 operator+(Complex32 a, Complex32 b) {
-    return {a.re + b.re, a.im + b.im};
-}
-constexpr Complex32 operator-(Complex32 a, Complex32 b) {
-    return {a.re - b.re, a.im - b.im};
-}
-/// -j a
-constexpr Complex32 turn_back(Complex32 a) {
-    return {a.im, -a.re};
-}
-
-/// x * c, c in Q30, rounded.
-constexpr std::int32_t scale_q30(std::int32_t x, std::int32_t c) {
-    return static_cast<std::int32_t>((static_cast<std::int64_t>(x) * c + (std::int64_t{1} << 29)) >> 30);
-}
-
-/// a * w, w in Q30, |w| <= 1.
-constexpr Complex32 rotate(Complex32 a, Complex32 w) {
-    const auto product = [](std::int32_t x, std::int32_t y) { return static_cast<std::int64_t>(x) * y; };
-    constexpr std::int64_t kHalf = std::int64_t{1} << 29;
-    return {static_cast<std::int32_t>((product(a.re, w.re) - product(a.im, w.im) + kHalf) >> 30),
-            static_cast<std::int32_t>((product(a.re, w.im) + product(a.im, w.re) + kHalf) >> 30)};
-}
-
-/// exp(-j 2 pi i / 64) in Q30 for i = n k, n and k in 1..7.
-constexpr auto kTwiddles = [] {
-    std::array<std::array<Complex32, 8>, 8> table{};
+constexpr auto kColumns = [] {
+    std::array<Column, 8> columns{};
     for (int n = 0; n < 8; ++n) {
-        for (int k = 0; k < 8; ++k) {
-            table[static_cast<std::size_t>(n)][static_cast<std::size_t>(k)] = {cosine_q30(n * k, kFftLength),
-                                                                               -sine_q30(n * k, kFftLength)};
+        Column& column = columns[static_cast<std::size_t>(n)];
+        column.rounding = kHalf + kBias[static_cast<std::size_t>(n)] * (1 << 14);
+        for (int i = 0; i < 8; ++i) {
+            column.twiddle[static_cast<std::size_t>(i)] = root(n * (i / 2 + i % 2 * 4));
         }
     }
-    return table;
+    return columns;
 }();
+constexpr Pair kEighth = root(8);
 
-constexpr std::int32_t kSqrtHalfQ30 = cosine_q30(1, 8);
-
-/// 8-point transform in place, natural order, radix-2 decimation in time written out.
-constexpr void fft8(std::array<Complex32, 8>& x) {
-    const Complex32 a0 = x[0] + x[4];
-    const Complex32 a1 = x[0] - x[4];
-    const Complex32 a2 = x[2] + x[6];
-    const Complex32 a3 = turn_back(x[2] - x[6]);
-    const Complex32 b0 = x[1] + x[5];
-    const Complex32 b1 = x[1] - x[5];
-    const Complex32 b2 = x[3] + x[7];
-    const Complex32 b3 = turn_back(x[3] - x[7]);
-
-    const Complex32 even0 = a0 + a2;
-    const Complex32 even1 = a1 + a3;
-    const Complex32 even2 = a0 - a2;
-    const Complex32 even3 = a1 - a3;
-    const Complex32 odd0 = b0 + b2;
-    const Complex32 odd1 = b1 + b3;
-    const Complex32 odd2 = turn_back(b0 - b2);
-    const Complex32 odd3 = b1 - b3;
-    // exp(-j pi/4) (re + j im) = sqrt(1/2) ((re + im) + j (im - re)); exp(-j 3 pi/4) likewise.
-    const Complex32 turned1{scale_q30(odd1.re + odd1.im, kSqrtHalfQ30),
-                            scale_q30(odd1.im - odd1.re, kSqrtHalfQ30)};
-    const Complex32 turned3{scale_q30(odd3.im - odd3.re, kSqrtHalfQ30),
-                            scale_q30(-odd3.re - odd3.im, kSqrtHalfQ30)};
-
-    x[0] = even0 + odd0;
-    x[4] = even0 - odd0;
-    x[1] = even1 + turned1;
-    x[5] = even1 - turned1;
-    x[2] = even2 + odd2;
-    x[6] = even2 - odd2;
-    x[3] = even3 + turned3;
-    x[7] = even3 - turned3;
+/// a w / 2, rounded.
+inline Pair rotate(Pair a, Pair w, std::int32_t rounding = kHalf) {
+    return packed::pack_high(packed::dot_minus(a, w, rounding), packed::dot_cross(a, w, rounding));
 }
 
-/// 2^15 * 2^9 * 64 * sqrt 2 < 2^31: the widest that cannot overflow, even for full-scale corners.
-constexpr int kGuardBits = 9;
-constexpr int kLowestExponent = -15;
+/// a w, rounded.
+inline Pair rotate_whole(Pair a, Pair w) {
+    constexpr std::int32_t kQuarter = kHalf / 2;
+    return packed::pack_doubled(packed::dot_minus(a, w, kQuarter), packed::dot_cross(a, w, kQuarter));
+}
+
+/// 8-point transform, radix-2 decimation in time written out: X[k], X[k + 4] for k = 0..3 to emit(k, X[k],
+/// X[k + 4]). In the order that needs few registers. The second and third level halve if asked to. The
+/// sums of the first level and, without halving, of the third clip.
+template <bool kHalve, class Load, class Emit>
+inline void radix8(Load x, Emit emit) {
+    using namespace packed;
+    const Pair x0 = x(0);
+    const Pair x4 = x(4);
+    const Pair a0 = saturated_add(x0, x4);
+    const Pair a1 = saturated_sub(x0, x4);
+    const Pair x2 = x(2);
+    const Pair x6 = x(6);
+    const Pair a2 = saturated_add(x2, x6);
+    const Pair a3 = saturated_sub(x2, x6);
+    const Pair even0 = kHalve ? half_add(a0, a2) : add(a0, a2);
+    const Pair even2 = kHalve ? half_sub(a0, a2) : sub(a0, a2);
+    const Pair even1 = kHalve ? half_sub_j(a1, a3) : sub_j(a1, a3);
+    const Pair even3 = kHalve ? half_add_j(a1, a3) : add_j(a1, a3);
+    const Pair x1 = x(1);
+    const Pair x5 = x(5);
+    const Pair b0 = saturated_add(x1, x5);
+    const Pair b1 = saturated_sub(x1, x5);
+    const Pair x3 = x(3);
+    const Pair x7 = x(7);
+    const Pair b2 = saturated_add(x3, x7);
+    const Pair b3 = saturated_sub(x3, x7);
+    const Pair odd0 = kHalve ? half_add(b0, b2) : add(b0, b2);
+    const Pair odd2 = kHalve ? half_sub(b0, b2) : sub(b0, b2);
+    const auto last = [&emit](std::size_t k, Pair a, Pair b) {
+        emit(k, kHalve ? half_add(a, b) : saturated_add(a, b), kHalve ? half_sub(a, b) : saturated_sub(a, b));
+    };
+    const auto last_j = [&emit](std::size_t k, Pair a, Pair b) {
+        emit(k, kHalve ? half_sub_j(a, b) : saturated_sub_j(a, b),
+             kHalve ? half_add_j(a, b) : saturated_add_j(a, b));
+    };
+    last(0, even0, odd0);
+    last_j(2, even2, odd2);
+    last(1, even1, rotate_whole(kHalve ? half_sub_j(b1, b3) : sub_j(b1, b3), kEighth));
+    // By 135 degrees: 45 and 90.
+    last_j(3, even3, rotate_whole(kHalve ? half_add_j(b1, b3) : add_j(b1, b3), kEighth));
+}
+
+inline Pair load(const Complex16& x) {
+    return std::bit_cast<Pair>(x);
+}
 
 }  // namespace
 
-int fft64(std::span<Complex16, kFftLength> data, int bits) {
-    std::array<std::array<Complex32, 8>, 8> work;
-    for (std::size_t n = 0; n < 8; ++n) {
-        std::array<Complex32, 8>& column = work[n];
-        for (std::size_t m = 0; m < 8; ++m) {
-            const Complex16 x = data[8 * m + n];
-            column[m] = {x.re * (1 << kGuardBits), x.im * (1 << kGuardBits)};
-        }
-        fft8(column);
-        for (std::size_t k = 1; k < 8; ++k) column[k] = rotate(column[k], kTwiddles[n][k]);
+void fft64(std::span<Complex16, kFftLength> data) {
+    alignas(8) std::array<Pair, kFftLength> work;  // [n][i], i as in Column
+    Pair* to = work.data();
+    const Complex16* from = data.data();
+    for (const Column& column : kColumns) {
+        radix8<false>([from](std::size_t m) { return load(from[8 * m]); },
+                      [to, &column](std::size_t k, Pair low, Pair high) {
+                          const Pair lower = rotate(low, column.twiddle[2 * k], column.rounding);
+                          const Pair upper = rotate(high, column.twiddle[2 * k + 1], column.rounding);
+                          to[2 * k] = lower;
+                          to[2 * k + 1] = upper;
+                      });
+        to += 8;
+        ++from;
     }
-    std::uint32_t magnitude = 0;  // or of all magnitudes: as wide as the largest
-    for (std::size_t k = 0; k < 8; ++k) {
-        std::array<Complex32, 8> row;
-        for (std::size_t n = 0; n < 8; ++n) row[n] = work[n][k];
-        fft8(row);
-        for (std::size_t n = 0; n < 8; ++n) {
-            magnitude |= static_cast<std::uint32_t>(row[n].re ^ (row[n].re >> 31));
-            magnitude |= static_cast<std::uint32_t>(row[n].im ^ (row[n].im >> 31));
-            work[n][k] = row[n];
-        }
-    }
-    if (magnitude == 0) {
-        std::ranges::fill(data, Complex16{});
-        return kLowestExponent;
-    }
-    const auto width = static_cast<int>(std::bit_width(magnitude));
-    const int shift = width - bits;
-    for (std::size_t i = 0; i < kFftLength; ++i) {
-        const Complex32 x = work[i / 8][i % 8];
-        if (shift > 0) {
-            // Rounding up from the very top would need one bit more: it saturates, less than one step low.
-            const std::int32_t top = (1 << bits) - 1;
-            data[i] = {static_cast<std::int16_t>(std::min(round_shift(x.re, shift), top)),
-                       static_cast<std::int16_t>(std::min(round_shift(x.im, shift), top))};
-        } else {
-            data[i] = {static_cast<std::int16_t>(x.re * (1 << -shift)),
-                       static_cast<std::int16_t>(x.im * (1 << -shift))};
+    for (std::size_t half = 0; half < 2; ++half) {
+        for (std::size_t k = 0; k < 4; ++k) {
+            Complex16* const out = &data[4 * half + k];
+            radix8<true>([row = &work[2 * k + half]](std::size_t n) { return row[8 * n]; },
+                         [out](std::size_t q, Pair low, Pair high) {
+                             out[8 * q] = std::bit_cast<Complex16>(low);
+                             out[8 * q + 32] = std::bit_cast<Complex16>(high);
+                         });
         }
     }
-    return shift - kGuardBits;
 }
 
-int fft64_real_pair(std::span<Complex16, kFftLength> z, std::span<Complex16, kFftLength / 2> a,
-                    std::span<Complex16, kFftLength / 2> b) {
-    const int exponent = fft64(z, 14);
-    for (std::size_t k = 0; k < kFftLength / 2; ++k) {
-        const Complex16 p = z[k];
-        const Complex16 q = z[(kFftLength - k) % kFftLength];
-        const auto narrow = [](int v) { return static_cast<std::int16_t>(v); };
-        a[k] = {narrow(p.re + q.re), narrow(p.im - q.im)};
-        b[k] = {narrow(p.im + q.im), narrow(q.re - p.re)};
-    }
-    return exponent - 1;
+void fft64_real_pair(std::span<Complex16, kFftLength> z, Complex16* ab, std::size_t stride) {
+    fft64(z);
+    const auto split = [&](std::size_t k, std::size_t mirrored) {
+        const Pair p = load(z[k]);
+        const Pair q = packed::swap(load(z[mirrored]));
+        ab[k * stride] = std::bit_cast<Complex16>(packed::sub_j(p, q));
+        ab[k * stride + 1] = std::bit_cast<Complex16>(packed::sub_j(q, p));
+    };
+    split(0, 0);
+    for (std::size_t k = 1; k < kFftLength / 2; ++k) split(k, kFftLength - k);
 }
 
 }  // namespace dsp

@@ -77,6 +77,12 @@ constexpr Pair half_sub_j(Pair a, Pair b) {
 constexpr std::int32_t clamp(std::int32_t v) {
     return v > 32767 ? 32767 : (v < -32768 ? -32768 : v);
 }
+constexpr Pair saturated_add(Pair a, Pair b) {
+    return pack(clamp(lane0(a) + lane0(b)), clamp(lane1(a) + lane1(b)));
+}
+constexpr Pair saturated_sub(Pair a, Pair b) {
+    return pack(clamp(lane0(a) - lane0(b)), clamp(lane1(a) - lane1(b)));
+}
 constexpr Pair saturated_add_j(Pair a, Pair b) {
     return pack(clamp(lane0(a) - lane1(b)), clamp(lane1(a) + lane0(b)));
 }
@@ -94,6 +100,9 @@ constexpr Pair pack_low(std::int32_t lane_0, std::int32_t lane_1) {
 }
 constexpr Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
     return pack(lane_0 >> 16, lane_1 >> 16);
+}
+constexpr Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
+    return pack(lane_0 >> 15, lane_1 >> 15);
 }
 constexpr Pair at_least(Pair a, Pair b) {
     return ((a & 0xFFFFU) >= (b & 0xFFFFU) ? 1U : 0U) | (a >> 16 >= b >> 16 ? 0x10000U : 0U);
@@ -150,6 +159,13 @@ inline Pair half_add_j(Pair a, Pair b) {
 inline Pair half_sub_j(Pair a, Pair b) {
     return static_cast<Pair>(__shsax(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
 }
+/// Clamped to 16 bits.
+inline Pair saturated_add(Pair a, Pair b) {
+    return static_cast<Pair>(__qadd16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
+inline Pair saturated_sub(Pair a, Pair b) {
+    return static_cast<Pair>(__qsub16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
+}
 /// a + j b and a - j b, clamped to 16 bits.
 inline Pair saturated_add_j(Pair a, Pair b) {
     return static_cast<Pair>(__qasx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b)));
@@ -176,6 +192,12 @@ inline Pair pack_low(std::int32_t lane_0, std::int32_t lane_1) {
 inline Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
     Pair result;
     asm("pkhtb %0, %1, %2, asr #16" : "=r"(result) : "r"(lane_1), "r"(lane_0));
+    return result;
+}
+/// The high halves of two words' doubles.
+inline Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
+    Pair result;
+    asm("pkhtb %0, %1, %2, asr #15" : "=r"(result) : "r"(static_cast<Pair>(lane_1) << 1), "r"(lane_0));
     return result;
 }
 /// One in each lane where a >= b, both unsigned; else zero.

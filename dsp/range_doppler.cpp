@@ -7,7 +7,6 @@
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
-#include "dsp/tapered_fft64.hpp"
 #include "dsp/unrolled.hpp"
 
 namespace dsp {
@@ -17,7 +16,6 @@ namespace {
 using packed::Pair;
 
 constexpr int kWindowBits = 15;
-constexpr int kCodeBits = 14;  ///< of what tapered_fft64 takes, before the window
 
 /// Windows that add up to more than one over half their length (rectangular, Hamming) leave one bit less to
 /// the data.
@@ -60,7 +58,7 @@ int taper_uneven(std::span<Complex16, kChirps> row, const std::array<std::int16_
             magnitude |= static_cast<std::uint32_t>(x ^ (x >> 31)) << kExtraBits >> down_of(k);
         }
     }
-    const int down = static_cast<int>(std::bit_width(magnitude)) - kExtraBits - kCodeBits + guard;
+    const int down = static_cast<int>(std::bit_width(magnitude)) - kExtraBits - kFftInputBits + guard;
     for (std::size_t k = 0; k < kChirps; ++k) {
         const int shift = kWindowBits + down_of(k) + down;
         const auto scale = [&](std::int32_t x) {
@@ -83,12 +81,12 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
         const int exponent = levels.exponent[pair] + guard;
         Spectrum64 z;
         remove_dc(frame.chirp[k], levels.sum[k], frame.chirp[k + 1], levels.sum[k + 1], exponent, window, z);
-        tapered_fft64_real_pair(z, &spectrum.row[0][k], kChirps);
-        // remove_dc rounds down: half a step in each of 64 samples is two in the sum, and in cell 0 alone.
+        fft64_real_pair(z, &spectrum.row[0][k], kChirps);
+        // remove_dc rounds down: half a step in each of 64 samples is eight in the sum, and in cell 0 alone.
         for (std::size_t i = k; i < k + 2; ++i) {
-            spectrum.row[0][i].re = static_cast<std::int16_t>(spectrum.row[0][i].re + 2);
+            spectrum.row[0][i].re = static_cast<std::int16_t>(spectrum.row[0][i].re + 8);
         }
-        spectrum.chirp_exponent[pair] = static_cast<std::int16_t>(exponent + kTaperedPairExponent);
+        spectrum.chirp_exponent[pair] = static_cast<std::int16_t>(exponent + kFftPairExponent);
     }
 }
 
@@ -96,15 +94,15 @@ void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell)
     auto& row = spectrum.row[static_cast<std::size_t>(range_cell)];
     const auto [lowest, highest] = std::ranges::minmax(spectrum.chirp_exponent);
     const int guard = guard_bits(window);
-    int down = magnitude_bits(row) - kCodeBits + guard;
+    int down = magnitude_bits(row) - kFftInputBits + guard;
     if (lowest == highest && down <= 1) {
         taper(row, window, down);
     } else {
         down = taper_uneven(row, spectrum.chirp_exponent, highest, window, guard);
     }
-    tapered_fft64(row);
+    fft64(row);
     spectrum.row_exponent[static_cast<std::size_t>(range_cell)] =
-        static_cast<std::int16_t>(highest + down + kTaperedExponent);
+        static_cast<std::int16_t>(highest + down + kFftExponent);
 }
 
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,

@@ -40,7 +40,8 @@ FftError measure_fft(double peak, int transforms) {
                        static_cast<std::int16_t>(std::lrint(uniform(random)))};
             x[n] = {static_cast<double>(data[n].re), static_cast<double>(data[n].im)};
         }
-        const int exponent = dsp::fft64(data);
+        const int exponent = scale_for_fft(data) + dsp::kFftExponent;
+        dsp::fft64(data);
         const auto exact = dft64(x);
         for (std::size_t k = 0; k < 64; ++k) {
             const Complex scaled = exact[k] * std::ldexp(1.0, -exponent);

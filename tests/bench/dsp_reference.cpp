@@ -52,6 +52,27 @@ std::array<Complex, 64> fft64(const std::array<Complex, 64>& x) {
     return out;
 }
 
+int scale_for_fft(std::span<dsp::Complex16, 64> data) {
+    double largest = 1;
+    double energy = 0;
+    for (const dsp::Complex16 x : data) {
+        const Complex value(x.re, x.im);
+        largest = std::max({largest, std::abs(value.real()), std::abs(value.imag())});
+        energy += std::norm(value);
+    }
+    int exponent = 0;
+    const double top = std::ldexp(1.0, dsp::kFftInputBits);
+    while (largest > top * std::ldexp(1.0, exponent)) ++exponent;
+    while (largest <= top * std::ldexp(0.5, exponent)) --exponent;
+    // |X|^2 <= 64 times the energy (Cauchy and Schwarz).
+    if (std::sqrt(64 * energy) > std::ldexp(1.0, 15 + dsp::kFftExponent + exponent)) ++exponent;
+    const auto scale = [exponent](std::int16_t x) {
+        return static_cast<std::int16_t>(std::lrint(std::ldexp(x, -exponent)));
+    };
+    for (dsp::Complex16& x : data) x = {scale(x.re), scale(x.im)};
+    return exponent;
+}
+
 std::vector<double> power_map(const dsp::BeatFrame& frame, dsp::WindowKind range, dsp::WindowKind doppler) {
     const dsp::Window& wr = dsp::window(range);
     const dsp::Window& wd = dsp::window(doppler);

@@ -5,9 +5,11 @@
 #include <complex>
 #include <cstdint>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "dsp/beat_frame.hpp"
+#include "dsp/fft64.hpp"
 #include "dsp/waveform.hpp"
 #include "dsp/window.hpp"
 
@@ -21,6 +23,11 @@ using Samples = std::vector<double>;  ///< 4096 converter inputs, [chirp][sample
 std::array<Complex, 64> dft64(const std::array<Complex, 64>& x);
 /// The same by a recursive split, for maps; tested against dft64 by the caller's results.
 std::array<Complex, 64> fft64(const std::array<Complex, 64>& x);
+
+/// Block floating point as the windows' stages do it, for data without a window: scales to
+/// dsp::kFftInputBits, rounding half to even, and one bit less where the block's energy could make a cell
+/// clip. Returns the exponent of the input.
+int scale_for_fft(std::span<dsp::Complex16, 64> data);
 
 /// log2 |X|^2 of the whole chain (mean removal, windows as make_window gives them, both transforms), 32 x 64,
 /// as linear power in squared codes.

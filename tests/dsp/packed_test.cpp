@@ -45,6 +45,8 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     lanes(wrap16(a0 + b1), wrap16(a1 - b0), sub_j(a, b));
     lanes(floor_half(a0 - b1), floor_half(a1 + b0), half_add_j(a, b));
     lanes(floor_half(a0 + b1), floor_half(a1 - b0), half_sub_j(a, b));
+    lanes(clamp16(a0 + b0), clamp16(a1 + b1), saturated_add(a, b));
+    lanes(clamp16(a0 - b0), clamp16(a1 - b1), saturated_sub(a, b));
     lanes(clamp16(a0 - b1), clamp16(a1 + b0), saturated_add_j(a, b));
     lanes(clamp16(a0 + b1), clamp16(a1 - b0), saturated_sub_j(a, b));
     lanes(std::max(a0, b0), std::max(a1, b1), largest(a, b));
@@ -59,6 +61,8 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     LONGS_EQUAL((product(sum, b0) - (product(sum, b0) & 0xFFFF)) / 65536, scale_0(sum, b));
     LONGS_EQUAL((product(sum, b1) - (product(sum, b1) & 0xFFFF)) / 65536, scale_1(sum, b));
     lanes(wrap16(sum), wrap16(~sum), pack_low(sum, ~sum));
+    lanes(wrap16((product(sum, 2) - (product(sum, 2) & 0xFFFF)) / 65536), wrap16(2 * a1 + (a0 < 0 ? 1 : 0)),
+          pack_doubled(sum, static_cast<std::int32_t>(a)));
     lanes(wrap16(sum / 65536 - (sum % 65536 < 0 ? 1 : 0)), a1, pack_high(sum, static_cast<std::int32_t>(a)));
 }
 }

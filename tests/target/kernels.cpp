@@ -108,11 +108,10 @@ std::array<dsp::Spectrum64, kRepeats> spectra;
 
 void fill(std::array<dsp::Spectrum64, kRepeats>& data) {
     Random random;
+    constexpr std::int32_t kTop = 1 << dsp::kFftInputBits;
+    const auto draw = [&random] { return static_cast<std::int16_t>(random.next() % (2 * kTop) - kTop); };
     for (auto& spectrum : data) {
-        for (auto& x : spectrum) {
-            x = {static_cast<std::int16_t>(random.next() - 32768),
-                 static_cast<std::int16_t>(random.next() - 32768)};
-        }
+        for (auto& x : spectrum) x = {draw(), draw()};
     }
 }
 
@@ -120,9 +119,9 @@ void measure_transforms() {
     fill(spectra);
     measure("fft64", kRepeats, [](std::uint32_t i) { dsp::fft64(spectra[i]); });
     fill(spectra);
-    std::array<dsp::Complex16, 32> a;
-    std::array<dsp::Complex16, 32> b;
-    measure("fft64_real_pair", kRepeats, [&](std::uint32_t i) { dsp::fft64_real_pair(spectra[i], a, b); });
+    dsp::Spectrum64 ab;
+    measure("fft64_real_pair", kRepeats,
+            [&](std::uint32_t i) { dsp::fft64_real_pair(spectra[i], ab.data(), 2); });
 
     const dsp::Window& window = dsp::window(kConfig.range_window);
     measure("dc_levels", kFrameRepeats, [](std::uint32_t) { (void)dsp::dc_levels(four); });

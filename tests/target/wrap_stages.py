@@ -16,8 +16,8 @@ import sys
 STAGES = {
     "input check": [r"^dsp::inspect\(", r"^dsp::noise_level\("],
     "dc removal": [r"^dsp::dc_levels\(", r"^dsp::remove_dc\("],
-    "range fft": [r"^dsp::tapered_fft64_real_pair\("],
-    "doppler fft": [r"^dsp::tapered_fft64\("],
+    "range fft": [r"^dsp::fft64_real_pair\("],
+    "doppler fft": [r"^dsp::fft64\("],
     "window and power": [r"^dsp::range_doppler\("],
     "cfar": [r"^dsp::cfar_peaks\("],
     "peaks": [r"^dsp::extract_peaks\("],
