@@ -267,13 +267,25 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
     const std::int32_t margin = log2_from_cdb(config.sidelobe_margin_cdb);
     const std::int32_t min_snr = log2_from_cdb(config.min_snr_cdb);
     const std::int32_t dynamic_range = log2_from_cdb(config.dynamic_range_cdb);
-    const auto response_to = [&](int range_distance, int doppler_distance) {
-        const auto fold = [](int distance) {  // to 0..32, the spectrum being cyclic
-            const int turn = distance & (kWindowLength - 1);
-            return static_cast<std::size_t>(std::min(turn, kWindowLength - turn));
-        };
-        return std::int32_t{range_response.sidelobe[fold(range_distance)]} +
-               doppler_response.sidelobe[fold(doppler_distance)];
+    // The spectrum is cyclic: distances 0..32.
+    const auto fold = [](int distance) {
+        const int turn = distance & (kWindowLength - 1);
+        return static_cast<std::size_t>(std::min(turn, kWindowLength - turn));
+    };
+    // Whether sidelobes of this response, log2, explain `peak` beside `target`.
+    const auto explains = [&](const Cell& target, const Cell& peak, std::int32_t response) {
+        return peak.power < target.power + std::max(response + margin, -dynamic_range);
+    };
+    const auto is_sidelobe = [&](const Cell& peak, const Cell& target) {
+        const std::int32_t range = range_response.sidelobe[fold(target.range - peak.range)];
+        // A real signal's other half: the spectrum at -range, -Doppler.
+        const std::int32_t range_mirrored = range_response.sidelobe[fold(target.range + peak.range)];
+        // What is too weak at the same Doppler shift is weaker at any other: nearly all pairs end here.
+        if (!explains(target, peak, std::max(range, range_mirrored))) return false;
+        return explains(
+            target, peak,
+            std::max(range + doppler_response.sidelobe[fold(target.doppler - peak.doppler)],
+                     range_mirrored + doppler_response.sidelobe[fold(target.doppler + peak.doppler)]));
     };
     const Real model_error = Real::ratio(config.model_error_mcell, 1000);
     const Real model_variance = model_error * model_error;
@@ -296,11 +308,7 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
             const Cell target = unpack(scratch[static_cast<std::size_t>(t)]);
             // The rest is weaker still.
             if (peak.power >= target.power + strongest_sidelobe && peak.range >= 2) break;
-            const std::int32_t sidelobes =
-                std::max(response_to(target.range - peak.range, target.doppler - peak.doppler),
-                         // A real signal's other half: the spectrum at -range, -Doppler.
-                         response_to(target.range + peak.range, target.doppler + peak.doppler));
-            sidelobe = peak.power < target.power + std::max(sidelobes + margin, -dynamic_range);
+            sidelobe = is_sidelobe(peak, target);
         }
         if (sidelobe) continue;
         scratch[static_cast<std::size_t>(targets++)] = pack(peak);
