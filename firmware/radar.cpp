@@ -231,7 +231,8 @@ void Radar::track_and_warn() {
         tracker_.step({measurements.data(), static_cast<std::size_t>(count)});
     counters_.detections_dropped += static_cast<std::uint32_t>(detections_.dropped);
     counters_.tracks_dropped += static_cast<std::uint32_t>(report.dropped_for_capacity);
-    observation_.over_capacity = detections_.dropped > 0 || report.dropped_for_capacity > 0;
+    observation_.over_capacity =
+        detections_.dropped > 0 || report.dropped_for_capacity > 0 || report.not_paired > 0;
     observation_.internal_error = report.invalid_measurements > 0;
 
     const tracking::EgoState<Real> ego{Real::ratio(ego_speed_mmps_, 1000),

@@ -7,7 +7,6 @@
 #include <span>
 
 #include "tracking/association.hpp"
-#include "tracking/bits.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
@@ -39,11 +38,14 @@ template <class S, class Weight, class MissedWeight>
 void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedWeight missed_weight,
                  Assignment<S>& out) {
     struct Reached {
-        S loss = S(0);              ///< by the best chain of rows that give way and end in this measurement
-        std::int8_t row = 0;        ///< last row of that chain
-        std::int8_t candidate = 0;  ///< which of its candidates the measurement is
+        S loss;                    ///< by the best chain of rows that give way and end in this measurement
+        std::int8_t row;           ///< last row of that chain
+        std::int8_t candidate;     ///< which of its candidates the measurement is
+        bool settled;              ///< its owner was asked to give way
+        std::int8_t for_row = -1;  ///< the new row for which all this was written
     };
     std::array<Reached, kMaxMeasurements> reached;
+    std::array<std::uint8_t, kMaxMeasurements> open;  // measurements reached, in the order they were
 
     constexpr auto kNone = static_cast<std::int8_t>(Assignment<S>::kNone);
     out.candidate.fill(kNone);
@@ -63,8 +65,7 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
         }
         out.row_price[static_cast<std::size_t>(start)] = price;
 
-        std::uint64_t open = 0;     // measurements reached
-        std::uint64_t settled = 0;  // of these, the ones whose owner was asked to give way
+        std::size_t open_count = 0;
         S loss = S(0);
         S loser_loss = S(0);
         int loser = kNone;  // the row that could go without at the least loss
@@ -79,37 +80,42 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
             }
             for (int c = 0; c < rows[t].count; ++c) {
                 const std::uint16_t j = measurement_of(row, c);
-                const std::uint64_t bit = std::uint64_t{1} << j;
-                if ((settled & bit) != 0) continue;
+                const bool known = reached[j].for_row == start;
+                if (known && reached[j].settled) continue;
                 const S next = loss + (out.row_price[t] + out.measurement_price[j] - weight(row, c));
-                if ((open & bit) == 0 || next < reached[j].loss) {
-                    open |= bit;
-                    reached[j] = {next, static_cast<std::int8_t>(row), static_cast<std::int8_t>(c)};
-                }
+                if (known && next >= reached[j].loss) continue;
+                if (!known) open[open_count++] = static_cast<std::uint8_t>(j);
+                reached[j] = {next, static_cast<std::int8_t>(row), static_cast<std::int8_t>(c), false,
+                              static_cast<std::int8_t>(start)};
             }
             int cheapest = kNone;
-            for_each_bit(open & ~settled, [&](std::uint32_t j) {
-                if (cheapest == kNone || reached[j].loss < reached[static_cast<std::size_t>(cheapest)].loss)
-                    cheapest = static_cast<int>(j);
-            });
+            for (const std::uint8_t j : std::span(open).first(open_count)) {
+                if (reached[j].settled) continue;
+                if (cheapest != kNone) {
+                    const S least = reached[static_cast<std::size_t>(cheapest)].loss;
+                    if (reached[j].loss > least || (reached[j].loss == least && j > cheapest)) continue;
+                }
+                cheapest = j;
+            }
             if (cheapest == kNone || loser_loss < reached[static_cast<std::size_t>(cheapest)].loss) break;
             loss = reached[static_cast<std::size_t>(cheapest)].loss;
             const int owner = out.owner[static_cast<std::size_t>(cheapest)];
             if (owner == kNone) {
                 found = cheapest;
             } else {
-                settled |= std::uint64_t{1} << cheapest;
+                reached[static_cast<std::size_t>(cheapest)].settled = true;
                 row = owner;
             }
         }
         const S end_loss = found == kNone ? loser_loss : loss;
 
         // The rows on the way accept less; what they compete for costs that much more.
-        for_each_bit(settled, [&](std::uint32_t j) {
+        for (const std::uint8_t j : std::span(open).first(open_count)) {
+            if (!reached[j].settled) continue;
             const S raise = end_loss - reached[j].loss;
             out.measurement_price[j] += raise;
             out.row_price[static_cast<std::size_t>(out.owner[j])] -= raise;
-        });
+        }
         out.row_price[static_cast<std::size_t>(start)] -= end_loss;
 
         // Hand the measurements down the chain, from its end back to the new row.

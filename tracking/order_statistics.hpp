@@ -80,7 +80,7 @@ inline constexpr int kNobody = -1;
 
 /// For each row the candidate that dominates it, or kNobody; for each measurement the row it dominates.
 struct Dominants {
-    std::array<int, kMaxTracks> candidate;
+    std::array<std::int8_t, kMaxTracks> candidate;
     std::array<std::int8_t, kMaxMeasurements> owner;
 
     Dominants() {
@@ -89,7 +89,7 @@ struct Dominants {
     }
     template <class S>
     void claim(std::size_t row, int item, const AssociationRow<S>& r) {
-        candidate[row] = item;
+        candidate[row] = static_cast<std::int8_t>(item);
         owner[r.item[static_cast<std::size_t>(item)].measurement] = static_cast<std::int8_t>(row);
     }
 };

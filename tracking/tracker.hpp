@@ -27,6 +27,9 @@
 namespace tracking {
 
 inline constexpr int kMaxTentative = kMaxTracks - kMaxConfirmed;
+/// Pairs of measurements near in range rate that are looked at to start tracks, a frame; measurements beyond
+/// that wait. Only a road where nearly everything has one range rate has more.
+inline constexpr int kMaxStartPairs = 1024;
 
 template <class S>
 struct TrackerConfig {
@@ -96,12 +99,13 @@ struct TrackerReport {
     int invalid_measurements = 0;  ///< not finite, or a variance that is not positive
     int gate_overflow = 0;         ///< measurements in a gate beyond kMaxGated
     int approximated = 0;          ///< clusters too large for exact JPDA
+    int not_paired = 0;            ///< measurements that started no track because of kMaxStartPairs
     int limited = 0;               ///< tracks that did not reach the level of iterative JIPDA asked for
 };
 
 /// All memory is inside the object (kMaxConfirmed association rows are most of it). A step is bounded:
 /// kMaxTracks gates over kMaxMeasurements, one association of at most kMaxConfirmed rows twice,
-/// kMaxMeasurements^2 pair tests to start tracks, kMaxTracks^2 merge tests.
+/// kMaxStartPairs pair tests to start tracks, kMaxTracks^2 merge tests.
 template <class S>
 class Tracker {
   public:
@@ -167,8 +171,9 @@ class Tracker {
     /// What is the same for all starts with a pending measurement of one age.
     struct StartMotion {
         S time_s;
-        Mat2<S> noise;  ///< of the motion in that time
-        S fold_step_m;  ///< by how much farther a fold in range rate brings a target
+        Mat2<S> noise;    ///< of the motion in that time
+        S fold_step_m;    ///< by how much farther a fold in range rate brings a target
+        S range_reach_m;  ///< how far off in range a partner may be at most, of this frame
     };
     /// A pending measurement, and how often its range rate is folded.
     struct Start {
@@ -183,7 +188,7 @@ class Tracker {
         for (StartMotion& m : start_motion_) {
             p = predict_covariance(p, config_.motion);
             time_s += config_.motion.period_s;
-            m = {time_s, p, time_s * config_.gate.rate_span_mps};
+            m = {time_s, p, time_s * config_.gate.rate_span_mps, S(0)};
         }
     }
     [[nodiscard]] int age_of_pending(std::size_t i) const { return i < old_pending_count_ ? 2 : 1; }
@@ -212,6 +217,7 @@ class Tracker {
     [[nodiscard]] bool obscured(const Track<S>& track) const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
                                        std::uint64_t usable, TrackerReport& report);
+    static std::uint64_t claimed_by(std::span<const AssociationRow<S>> rows);
     void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S log_excess,
                          S& existence, std::span<const Measurement<S>> measurements);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
@@ -320,9 +326,11 @@ template <class S>
 std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
                                                std::uint64_t usable, TrackerReport& report) {
     std::array<S, kMaxConfirmed> existence;
-    std::array<RankInput<S>, kMaxConfirmed> rank;
-    std::array<S, kMaxMeasurements> strength;
-    for (std::size_t i = 0; i < measurements.size(); ++i) strength[i] = measurements[i].snr_db;
+    std::array<RankInput<S>, kHasExistence ? kMaxConfirmed : 0> rank;
+    std::array<S, kHasExistence ? kMaxMeasurements : 0> strength;
+    if (uses_rank(config_.associator)) {
+        for (std::size_t i = 0; i < measurements.size(); ++i) strength[i] = measurements[i].snr_db;
+    }
     std::size_t rows = 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         const Track<S>& t = track_[i];
@@ -330,10 +338,9 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         AssociationRow<S>& row = row_[rows];
         const bool hidden = confirmed && obscured(t);
         const S reach = gate_.rate_reach(t.covariance(1, 1), index_.largest_variance(), hidden);
-        gate_.fill(row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], reach), hidden,
-                   [&](const Vec2<S>& z) {
-                       return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z);
-                   });
+        gate_.fill(
+            row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], reach), hidden,
+            [&](const Vec2<S>& z) { return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z); });
         S counted(0);
         if (config_.gate.nonparametric) {
             counted = gate_.log_counted_excess(row, t, measurements);
@@ -351,24 +358,34 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
     if (!by_modes()) {
         const AssociationStatus status = associate<S>(
             {row_.data(), rows},
-            {{existence.data(), rows}, {strength.data(), measurements.size()}, {rank.data(), rows}},
+            {{existence.data(), rows},
+             std::span<const S>(strength).first(uses_rank(config_.associator) ? measurements.size() : 0),
+             std::span<const RankInput<S>>(rank).first(uses_rank(config_.associator) ? rows : 0)},
             config_.associator, config_.order_statistics, config_.ijipda, work_);
         report.approximated += status.approximated;
         report.limited += status.limited;
     }
 
-    std::array<S, kMaxMeasurements> share{};
-    rows = 0;
+    std::size_t next = 0;
     for (Track<S>& t : live()) {
         if (t.is_confirmed() != confirmed) continue;
-        t.existence = existence[rows];
-        const AssociationRow<S>& row = row_[rows++];
-        for (const Candidate<S>& c : row.candidates()) share[c.measurement] += c.weight;
-        update(t, row, measurements);
+        t.existence = existence[next];
+        update(t, row_[next++], measurements);
     }
+    return claimed_by({row_.data(), rows});
+}
+
+/// Measurements more than half of which the rows share out. Not inlined: the sums would lie on the stack
+/// beneath the association, where it is deepest.
+template <class S>
+[[gnu::noinline]] std::uint64_t Tracker<S>::claimed_by(std::span<const AssociationRow<S>> rows) {
+    std::array<S, kMaxMeasurements> share{};
     std::uint64_t claimed = 0;
-    for (std::size_t i = 0; i < measurements.size(); ++i) {
-        if (share[i] >= constant<S>(1, 2)) claimed |= bit(i);
+    for (const AssociationRow<S>& row : rows) {
+        for (const Candidate<S>& c : row.candidates()) {
+            share[c.measurement] += c.weight;
+            if (share[c.measurement] >= constant<S>(1, 2)) claimed |= bit(c.measurement);
+        }
     }
     return claimed;
 }
@@ -443,15 +460,13 @@ void Tracker<S>::consider_start(std::size_t from, const Vec2<S>& z, const Vec2<S
     const S rate_variance = pending.noise[1] + motion.noise(1, 1) + noise[1];
     if (product_exceeds(change[1], change[1], config_.gate.gate, rate_variance)) return;
     const S travel = change[0] - motion.time_s * pending.z[1];
-    const S range_variance = pending.noise[0] + motion.noise(0, 0) +
-                             motion.time_s * (motion.time_s * pending.noise[1]) + noise[0];
     const S span = config_.gate.rate_span_mps;
     const int folds = span > S(0) ? 1 : 0;
     for (int fold = -folds; fold <= folds; ++fold) {
-        const Vec2<S> nu(fold == 0 ? travel
-                                   : (fold > 0 ? travel - motion.fold_step_m : travel + motion.fold_step_m),
-                         change[1]);
-        if (product_exceeds(nu[0], nu[0], config_.gate.gate, range_variance)) continue;
+        const Vec2<S> nu(
+            fold == 0 ? travel : (fold > 0 ? travel - motion.fold_step_m : travel + motion.fold_step_m),
+            change[1]);
+        if (absolute(nu[0]) > motion.range_reach_m) continue;
         const S rate = pending.z[1] + span * fold;
         if (rate < config_.min_start_rate_mps || rate > config_.max_start_rate_mps) continue;
         S distance2(0);
@@ -469,14 +484,36 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
     index_.clear();
-    for (const Pending& p : std::span(pending_).first(pending_count_)) index_.add(p.z[1], p.noise[1]);
-    const S most_change = index_.largest_variance() + start_motion_[kStartFrames - 1].noise(1, 1);
+    S range_variance(0);  // the largest of two measurements together
+    for (const Pending& p : std::span(pending_).first(pending_count_)) {
+        index_.add(p.z[1], p.noise[1]);
+        range_variance = p.noise[0] > range_variance ? p.noise[0] : range_variance;
+    }
+    S largest(0);
+    for_each_bit(unclaimed, [&](std::uint32_t index) {
+        const S variance = gate_.noise(measurements[index], false)[0];
+        largest = variance > largest ? variance : largest;
+    });
+    range_variance += largest;
+    const S rate_variance = index_.largest_variance();
+    for (StartMotion& m : start_motion_) {
+        const S travelled = m.time_s * (m.time_s * rate_variance);
+        m.range_reach_m = sqrt_above(S(config_.gate.gate * S(range_variance + m.noise(0, 0) + travelled)));
+    }
+    const S most_change = rate_variance + start_motion_[kStartFrames - 1].noise(1, 1);
+    int pairs = 0;
     for_each_bit(unclaimed, [&](std::uint32_t index) {
         const Measurement<S>& m = measurements[index];
         const Vec2<S> noise = gate_.noise(m, false);
         Start best;
-        for_each_bit(index_.near(m.z[1], gate_.rate_reach(most_change, noise[1], false)) & ~used,
-                     [&](std::uint32_t from) { consider_start(from, m.z, noise, best); });
+        const std::uint64_t near =
+            index_.near(m.z[1], gate_.rate_reach(most_change, noise[1], false)) & ~used;
+        pairs += std::popcount(near);
+        if (pairs > kMaxStartPairs) {
+            ++report.not_paired;
+            return;
+        }
+        for_each_bit(near, [&](std::uint32_t from) { consider_start(from, m.z, noise, best); });
         if (best.from < 0) return;
 
         const auto from = static_cast<std::size_t>(best.from);

@@ -1,5 +1,6 @@
 // What data association costs on a board, in instructions: one line a figure on the console,
-// `bench <name> <instructions>`. The image has all associators, whatever the firmware was configured with.
+// `bench <name> <instructions>`. First the arithmetic is checked: exit code 1 if it gives other bits than the
+// PC's. The image has all associators, whatever the firmware was configured with.
 //
 //   step.4x7.<associator>[.<part>]      4 tracks, 7 detections, every one in every gate and each with its own
 //                                       accuracy: predict, gate, associate, update
@@ -219,10 +220,48 @@ void measure_tracker(Associator associator) {
     print("worst", worst);
 }
 
+/// The instructions of dsp/fixed_point.hpp against plain C++ in 64 bits, on operands of every size and at the
+/// ends of the range.
+bool arithmetic_agrees() {
+    constexpr std::array<std::int32_t, 10> kEdges{
+        0, 1, -1, 2, 1 << 21, -(1 << 21), INT32_MAX, INT32_MIN, INT32_MAX - 1, INT32_MIN + 1};
+    std::uint32_t state = 1;
+    const auto next = [&state] {
+        state = state * 1'664'525U + 1'013'904'223U;
+        return state;
+    };
+    const auto operand = [&](std::size_t i) {
+        return i < kEdges.size() ? kEdges[i] : static_cast<std::int32_t>(next()) >> (next() >> 27);
+    };
+    for (std::size_t i = 0; i < 64; ++i) {
+        for (std::size_t j = 0; j < 64; ++j) {
+            // Volatile: the compiler must not know the values and do the sums itself.
+            volatile std::int32_t left = operand(i);
+            volatile std::int32_t right = operand(j);
+            const std::int32_t a = left;
+            const std::int32_t b = right;
+            const std::int64_t wide_a = a;
+            const std::int64_t wide_b = b;
+            const std::int64_t sum = static_cast<std::int64_t>(std::uint64_t{next()} << 32 | next());
+            const auto accumulated = static_cast<std::int64_t>(static_cast<std::uint64_t>(sum) +
+                                                               static_cast<std::uint64_t>(wide_a * wide_b));
+            const std::int64_t product = wide_a * wide_b;
+            if (dsp::product(a, b) != product || dsp::accumulated(sum, a, b) != accumulated ||
+                dsp::saturated_sum(a, b) != dsp::saturate32(wide_a + wide_b) ||
+                dsp::saturated_difference(a, b) != dsp::saturate32(wide_a - wide_b) ||
+                dsp::narrowed<22>(product) != dsp::saturate32(dsp::round_shift(product, 22)) ||
+                dsp::narrowed<30>(product) != dsp::saturate32(dsp::round_shift(product, 30)))
+                return false;
+        }
+    }
+    return true;
+}
+
 }  // namespace
 
 int main() {
     target::start();
+    if (!arithmetic_agrees()) semihosting::exit(1);
     for (std::size_t a = 0; a < static_cast<std::size_t>(Associator::imm_pdaf); ++a) {
         const auto associator = static_cast<Associator>(a);
         make_cluster(4, 7, false);
