@@ -5,6 +5,7 @@
 
 #include "dsp/packed.hpp"
 #include "dsp/sine.hpp"
+#include "dsp/unrolled.hpp"
 
 namespace dsp {
 
@@ -134,16 +135,18 @@ void fft64(std::span<Complex16, kFftLength> data) {
     }
 }
 
-void fft64_real_pair(std::span<Complex16, kFftLength> z, Complex16* ab, std::size_t stride) {
+void fft64_real_pair(std::span<Complex16, kFftLength> z, Complex16* ab) {
     fft64(z);
     const auto split = [&](std::size_t k, std::size_t mirrored) {
         const Pair p = load(z[k]);
         const Pair q = packed::swap(load(z[mirrored]));
-        ab[k * stride] = std::bit_cast<Complex16>(packed::sub_j(p, q));
-        ab[k * stride + 1] = std::bit_cast<Complex16>(packed::sub_j(q, p));
+        ab[k * kFftLength] = std::bit_cast<Complex16>(packed::sub_j(p, q));
+        ab[k * kFftLength + 1] = std::bit_cast<Complex16>(packed::sub_j(q, p));
     };
     split(0, 0);
-    for (std::size_t k = 1; k < kFftLength / 2; ++k) split(k, kFftLength - k);
+    constexpr std::size_t kLast = kFftLength / 2 - 1;
+    unrolled<kLast - 1, 1, 5>([&](std::size_t i) { split(i + 1, kFftLength - 1 - i); });
+    split(kLast, kFftLength - kLast);
 }
 
 }  // namespace dsp

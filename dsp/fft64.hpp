@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -32,15 +31,15 @@ inline constexpr int kFftInputBits = 12;
 /// corners of a square of +-2^12 clip where many of them add up. The first of two passes of 8-point
 /// transforms halves in the twiddles, the second at its second and third level. Twiddles are Q15 and round;
 /// the other halvings round down, and constants added with the twiddles take that bias off again. Noise at
-/// the output: 0.16 square steps in each part, no bias. Cost: about 1150 instructions.
+/// the output: 0.16 square steps in each part, no bias. Cost: about 1130 instructions.
 inline constexpr int kFftExponent = 3;
 void fft64(std::span<Complex16, kFftLength> data);
 
 /// Two real sequences with one transform of z = a + j b, which is overwritten: for the lower half of the
-/// cells A[k] = (Z[k] + conj Z[64-k]) / 2 to ab[k * stride] and B[k] = (Z[k] - conj Z[64-k]) / 2j to the
-/// element after it, both in units of 2^kFftPairExponent: with a window as above, the sums fit without the
-/// division by two.
+/// cells A[k] = (Z[k] + conj Z[64-k]) / 2 to ab[64 k] and B[k] = (Z[k] - conj Z[64-k]) / 2j to the element
+/// after it, two columns of a matrix with rows of 64, both in units of 2^kFftPairExponent: with a window as
+/// above, the sums fit without the division by two. `ab` has at least 31 * 64 + 2 elements.
 inline constexpr int kFftPairExponent = kFftExponent - 1;
-void fft64_real_pair(std::span<Complex16, kFftLength> z, Complex16* ab, std::size_t stride);
+void fft64_real_pair(std::span<Complex16, kFftLength> z, Complex16* ab);
 
 }  // namespace dsp

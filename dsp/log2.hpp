@@ -93,10 +93,11 @@ constexpr std::int32_t log2_q10(std::uint32_t v) {
     return octave * kLogOne + static_cast<std::int32_t>((fraction + (1U << 5)) >> 6);
 }
 
-/// log2(v) in Q6.10 for v > 0 from a table alone: error at most 3.5 steps, 0.01 dB. For the cells of a map.
-constexpr std::int32_t log2_coarse_q10(std::uint32_t v) {
-    const int zeros = std::countl_zero(v);
-    return detail::kLog2CoarseTable[(v << zeros >> 23) & 0xFFU] + (31 - zeros) * kLogOne;
+/// offset + log2(v) in Q6.10 from a table alone: error at most 3.5 steps, 0.01 dB; zero counts as one. For
+/// the cells of a map.
+constexpr std::int32_t log2_coarse_q10(std::uint32_t v, std::int32_t offset = 0) {
+    const int zeros = std::countl_zero(v | 1);  // at most 31, a shift that C++ defines
+    return (offset + 31 * kLogOne - zeros * kLogOne) + detail::kLog2CoarseTable[(v << zeros >> 23) & 0xFFU];
 }
 
 /// 2^(x/1024) in Q30 for x <= 0; relative error below 1e-4 or one unit of the last place. Zero below 2^-31.

@@ -119,6 +119,12 @@ constexpr std::int32_t dot_cross(Pair a, Pair b, std::int32_t sum) {
 constexpr std::int32_t multiply_00(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) + sum);
 }
+constexpr std::int32_t multiply_01(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane0(a), lane1(b)) + sum);
+}
+constexpr std::int32_t multiply_11(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane1(a), lane1(b)) + sum);
+}
 constexpr std::int32_t multiply_10(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane1(a), lane0(b)) + sum);
 }
@@ -217,9 +223,15 @@ inline std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
 inline std::int32_t dot_cross(Pair a, Pair b, std::int32_t sum) {
     return __smladx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
 }
-/// sum + a0 b0 and sum + a1 b0
+/// sum + a0 b0, sum + a1 b0 and so on
 inline std::int32_t multiply_00(Pair a, Pair b, std::int32_t sum) {
     return __smlabb(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), sum);
+}
+inline std::int32_t multiply_01(Pair a, Pair b, std::int32_t sum) {
+    return __smlabt(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), sum);
+}
+inline std::int32_t multiply_11(Pair a, Pair b, std::int32_t sum) {
+    return __smlatt(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), sum);
 }
 inline std::int32_t multiply_10(Pair a, Pair b, std::int32_t sum) {
     return __smlatb(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), sum);

@@ -29,20 +29,27 @@ int magnitude_bits(std::span<const Complex16, kChirps> row) {
     return packed::magnitude_bits(spreads);
 }
 
-/// The window, and `down` bits less, -13..1, for chirps of the same exponent.
+/// The window, and `down` bits less, for chirps of the same exponent.
 void taper(std::span<Complex16, kChirps> row, const Window& window, int down) {
-    const int lift = 1 - down;  // of the product of which the upper 16 bits are taken
-    const std::int32_t rounding = (1 << 15) >> lift;
-    unrolled<kChirps, 1, 4>([&](std::size_t k) {
+    const int shift = kWindowBits + down;  // at least 4: a row has at least one bit
+    const std::int32_t rounding = (1 << shift) >> 1;
+    unrolled<kChirps, 2, 2>([&](std::size_t k) {
         const Pair x = std::bit_cast<Pair>(row[k]);
-        const auto w = static_cast<Pair>(window[k]);
-        const auto scale = [lift](std::int32_t v) {
-            return static_cast<std::int32_t>(static_cast<std::uint32_t>(v) << lift);
-        };
-        const std::int32_t re = scale(packed::multiply_00(x, w, rounding));
-        const std::int32_t im = scale(packed::multiply_10(x, w, rounding));
-        row[k] = std::bit_cast<Complex16>(packed::pack_high(re, im));
+        const Pair y = std::bit_cast<Pair>(row[k + 1]);
+        const Pair w = packed::load(&window[k]);
+        row[k] = std::bit_cast<Complex16>(packed::pack_low(packed::multiply_00(x, w, rounding) >> shift,
+                                                           packed::multiply_10(x, w, rounding) >> shift));
+        row[k + 1] = std::bit_cast<Complex16>(packed::pack_low(packed::multiply_01(y, w, rounding) >> shift,
+                                                               packed::multiply_11(y, w, rounding) >> shift));
     });
+}
+
+/// Whether no chirp has an exponent of its own.
+bool even(const std::array<std::int16_t, kChirps / 2>& exponent) {
+    const Pair first = packed::both(static_cast<std::uint16_t>(exponent[0]));
+    Pair different = 0;
+    unrolled<kChirps / 2, 2, 8>([&](std::size_t i) { different |= packed::load(&exponent[i]) ^ first; });
+    return different == 0;
 }
 
 /// The same for chirps of different exponents, value = row * 2^exponent: as many bits as the row's largest
@@ -73,6 +80,8 @@ int taper_uneven(std::span<Complex16, kChirps> row, const std::array<std::int16_
 
 }  // namespace
 
+static_assert(kChirps == kFftLength);
+
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum) {
     const int guard = guard_bits(window);
@@ -81,7 +90,7 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
         const int exponent = levels.exponent[pair] + guard;
         Spectrum64 z;
         remove_dc(frame.chirp[k], levels.sum[k], frame.chirp[k + 1], levels.sum[k + 1], exponent, window, z);
-        fft64_real_pair(z, &spectrum.row[0][k], kChirps);
+        fft64_real_pair(z, &spectrum.row[0][k]);
         // remove_dc rounds down: half a step in each of 64 samples is eight in the sum, and in cell 0 alone.
         for (std::size_t i = k; i < k + 2; ++i) {
             spectrum.row[0][i].re = static_cast<std::int16_t>(spectrum.row[0][i].re + 8);
@@ -92,12 +101,14 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
 
 void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell) {
     auto& row = spectrum.row[static_cast<std::size_t>(range_cell)];
-    const auto [lowest, highest] = std::ranges::minmax(spectrum.chirp_exponent);
     const int guard = guard_bits(window);
-    int down = magnitude_bits(row) - kFftInputBits + guard;
-    if (lowest == highest && down <= 1) {
+    int highest = spectrum.chirp_exponent[0];
+    int down = 0;
+    if (even(spectrum.chirp_exponent)) {
+        down = magnitude_bits(row) - kFftInputBits + guard;
         taper(row, window, down);
     } else {
+        highest = *std::ranges::max_element(spectrum.chirp_exponent);
         down = taper_uneven(row, spectrum.chirp_exponent, highest, window, guard);
     }
     fft64(row);
@@ -111,8 +122,7 @@ void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
     unrolled<kDopplerCells, 1, 4>([&](std::size_t d) {
         const Pair x = std::bit_cast<Pair>(row[d]);
         const auto square = static_cast<std::uint32_t>(packed::dot(x, x, 0));  // at most 2^31
-        power[d] = static_cast<std::uint16_t>(
-            std::max<std::int32_t>(log2_coarse_q10(std::max<std::uint32_t>(square, 1)) + scale, 0));
+        power[d] = static_cast<std::uint16_t>(std::max<std::int32_t>(log2_coarse_q10(square, scale), 0));
     });
 }
 

@@ -58,6 +58,8 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     LONGS_EQUAL(wrap32(product(a0, b1) + product(a1, b0) + sum), dot_cross(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b0) + sum), multiply_00(a, b, sum));
     LONGS_EQUAL(wrap32(product(a1, b0) + sum), multiply_10(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a0, b1) + sum), multiply_01(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a1, b1) + sum), multiply_11(a, b, sum));
     LONGS_EQUAL((product(sum, b0) - (product(sum, b0) & 0xFFFF)) / 65536, scale_0(sum, b));
     LONGS_EQUAL((product(sum, b1) - (product(sum, b1) & 0xFFFF)) / 65536, scale_1(sum, b));
     lanes(wrap16(sum), wrap16(~sum), pack_low(sum, ~sum));
