@@ -13,10 +13,11 @@ void detect(const BeatFrame& frame, const DspConfig& config, const CellScale& sc
     workspace.noise_level = noise_level(workspace.map, config.cfar.first_range_cell);
     // Of noise, three quarters of the cells are above this level.
     const std::int32_t level = workspace.noise_level - kLogOne * 5 / 4;
+    CellMask peaks;
     cfar_peaks(workspace.map, workspace.cfar, static_cast<std::uint16_t>(std::max<std::int32_t>(level, 0)),
-               workspace.peaks);
-    extract_peaks(workspace.spectrum, workspace.map, workspace.peaks, workspace.cfar, config.range_window,
-                  config.doppler_window, config.peaks, scale, workspace.candidates, detections);
+               peaks);
+    extract_peaks(workspace.spectrum, workspace.map, peaks, workspace.cfar, config.range_window,
+                  config.doppler_window, config.peaks, scale, detections);
 }
 
 }  // namespace dsp

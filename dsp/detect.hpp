@@ -29,13 +29,11 @@ struct DspConfig {
 };
 static_assert(DspConfig{}.valid());
 
-/// All memory the signal processing needs besides the frame, about 13 KiB. All but `candidates` are
-/// those of the frame after detect().
+/// All memory the signal processing needs besides the frame, about 13 KiB: `map`,
+/// `spectrum` and `noise_level` are those of the frame after detect().
 struct Workspace {
     Spectrum spectrum;
     PowerMap map;
-    CellMask peaks;
-    CandidateList candidates;
     std::uint16_t noise_level = 0;  ///< see noise_level()
     OsCfar cfar{CfarConfig{}};      ///< rebuilt when the configuration changes
 };

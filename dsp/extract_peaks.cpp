@@ -17,6 +17,11 @@ namespace {
 constexpr int kReach = WindowResponse::kReach;
 constexpr int kTaps = WindowResponse::kTaps;
 
+/// A local maximum, ordered by power, then by place, so that the order of equals is defined.
+/// Bits 31..16 log-power, 10..6 range cell, 5..0 Doppler cell.
+using Candidate = std::uint32_t;
+using CandidateList = std::array<Candidate, kMaxCandidates>;
+
 struct Cell {
     int range;
     int doppler;
@@ -261,7 +266,7 @@ Real decibels(std::int32_t log2_power) {
 
 void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask& peaks, const OsCfar& cfar,
                    WindowKind range_window, WindowKind doppler_window, const PeakConfig& config,
-                   const CellScale& scale, CandidateList& scratch, DetectionList& detections) {
+                   const CellScale& scale, DetectionList& detections) {
     const WindowResponse& range_response = window_response(range_window);
     const WindowResponse& doppler_response = window_response(doppler_window);
     const std::int32_t margin = log2_from_cdb(config.sidelobe_margin_cdb);
@@ -299,19 +304,20 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
 
     detections.count = 0;
     detections.dropped = 0;
-    const int candidates = collect(map, peaks, scratch, detections.dropped);
+    CandidateList list;
+    const int candidates = collect(map, peaks, list, detections.dropped);
     int targets = 0;  // the candidates that are no sidelobes move to the front of the list
     for (int c = 0; c < candidates; ++c) {
-        const Cell peak = unpack(scratch[static_cast<std::size_t>(c)]);
+        const Cell peak = unpack(list[static_cast<std::size_t>(c)]);
         bool sidelobe = false;
         for (int t = 0; t < targets && !sidelobe; ++t) {
-            const Cell target = unpack(scratch[static_cast<std::size_t>(t)]);
+            const Cell target = unpack(list[static_cast<std::size_t>(t)]);
             // The rest is weaker still.
             if (peak.power >= target.power + strongest_sidelobe && peak.range >= 2) break;
             sidelobe = is_sidelobe(peak, target);
         }
         if (sidelobe) continue;
-        scratch[static_cast<std::size_t>(targets++)] = pack(peak);
+        list[static_cast<std::size_t>(targets++)] = pack(peak);
 
         const std::int32_t snr = peak.power - cfar.noise(map, peak.range, peak.doppler);
         if (snr < min_snr) continue;

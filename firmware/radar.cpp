@@ -24,7 +24,7 @@ std::int32_t milli(Real v) {
 }  // namespace
 
 Radar::Radar(const RadarConfig& config, const hal::Board& board)
-    : initial_(config),
+    : initial_{config.tracker.associator, config.dsp.cfar.offset_cdb, config.dsp.peaks.min_snr_cdb},
       config_(config),
       scale_(config.waveform.scale()),
       board_(board),
@@ -39,7 +39,9 @@ void Radar::start() {
 }
 
 void Radar::reset_state() {
-    config_ = initial_;
+    config_.tracker.associator = initial_.associator;
+    config_.dsp.cfar.offset_cdb = initial_.cfar_offset_cdb;
+    config_.dsp.peaks.min_snr_cdb = initial_.min_snr_cdb;
     tracker_.configure(config_.tracker);
     collision_.reset();
     health_ = Health(config_.health);

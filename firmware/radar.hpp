@@ -106,7 +106,13 @@ class Radar {
     void send(const can::Frame& frame) { (void)board_.can.send(frame); }
     void reset_state();
 
-    const RadarConfig initial_;
+    /// What commands may change, as it was at the start.
+    struct Commanded {
+        tracking::Associator associator;
+        std::int16_t cfar_offset_cdb;
+        std::int16_t min_snr_cdb;
+    };
+    const Commanded initial_;
     RadarConfig config_;
     dsp::CellScale scale_;
     hal::Board board_;

@@ -257,7 +257,7 @@ TEST(ExtractPeaks, KeepsTheStrongestAndCountsTheRest) {
     }
     const dsp::OsCfar cfar{dsp::CfarConfig{}};
     dsp::extract_peaks(workspace->spectrum, workspace->map, peaks, cfar, WindowKind::hann, WindowKind::hann,
-                       {}, kScale, workspace->candidates, list);
+                       {}, kScale, list);
     LONGS_EQUAL(dsp::kMaxDetections, list.count);
     LONGS_EQUAL(150 - dsp::kMaxDetections, list.dropped);
     for (int i = 0; i < list.count; ++i) {

@@ -152,9 +152,8 @@ void measure_frame(const dsp::BeatFrame& frame, std::string_view cfar, std::stri
             [&](std::uint32_t) { dsp::detect(frame, kConfig, kScale, workspace, detections); });
     measure_cfar(cfar);
     measure(peaks, kFrameRepeats, [](std::uint32_t) {
-        dsp::extract_peaks(workspace.spectrum, workspace.map, workspace.peaks, workspace.cfar,
-                           kConfig.range_window, kConfig.doppler_window, kConfig.peaks, kScale,
-                           workspace.candidates, detections);
+        dsp::extract_peaks(workspace.spectrum, workspace.map, hits, workspace.cfar, kConfig.range_window,
+                           kConfig.doppler_window, kConfig.peaks, kScale, detections);
     });
 }
 
