@@ -47,7 +47,9 @@ run_tests host-clang -L bit-exact
 # Studies take minutes with sanitizers; their building blocks are tested with them all the same.
 run_tests host-debug -j "$jobs" -E "radar_study|study_"
 for board in $boards; do run_tests "$board" -j "$jobs"; done
-run_tests host -L vcan
+# Hardware in the loop, an emulator within an emulator, takes minutes and its time-outs have been seen to fire on a busy
+# machine: ctest --preset host -R vcan.hil runs it on request.
+run_tests host -L vcan -E vcan.hil
 
 echo "$total_passed passed, $total_failed failed, $total_skipped skipped"
 [ "$total_failed" -eq 0 ]
