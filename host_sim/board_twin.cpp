@@ -128,24 +128,25 @@ bool BoardTwin::header_and_objects_there() const {
     return list_.size() >= kHeaderAt + 1 + 2 * std::size_t{header.count};
 }
 
-void BoardTwin::add_candidate(const History& before, hal::BeatResult beat, std::size_t beat_index,
+void BoardTwin::add_candidate(const History& before, hal::BeatResult beat, std::size_t beats_gone,
                               bool overrun, std::size_t bus_count) {
     const auto bus_end = before.bus.begin() + static_cast<std::ptrdiff_t>(bus_count);
     const std::vector<can::Frame> bus(before.bus.begin(), bus_end);
     CycleInputs inputs{.beat = beat, .overrun = overrun, .bus = bus};
     Candidate c{.after = before, .list = {}, .beat = beat, .sequence = 0};
     c.after.bus.erase(c.after.bus.begin(), c.after.bus.begin() + static_cast<std::ptrdiff_t>(bus_count));
+    c.after.beats.erase(c.after.beats.begin(),
+                        c.after.beats.begin() + static_cast<std::ptrdiff_t>(beats_gone));
     BoardTwinCounters& counters = c.after.counters;
     if (overrun) ++counters.overruns;
     switch (beat) {
         case hal::BeatResult::ok:
-            inputs.frame = &before.beats[beat_index]->frame;
-            inputs.sequence = c.sequence = before.beats[beat_index]->sequence;
-            c.after.beats.erase(c.after.beats.begin(),
-                                c.after.beats.begin() + static_cast<std::ptrdiff_t>(beat_index) + 1);
+            inputs.frame = &before.beats[beats_gone - 1]->frame;
+            inputs.sequence = c.sequence = before.beats[beats_gone - 1]->sequence;
             ++counters.processed;
             break;
         case hal::BeatResult::invalid:
+            if (beats_gone == 0) c.after.met_old_bytes = true;
             ++counters.invalid;
             break;
         default:
@@ -163,6 +164,12 @@ void BoardTwin::find_candidates(std::size_t beats) {
     candidates_.clear();
     can::Status status;
     const bool readable = can::decode(list_.front(), status);
+    // A fault's bit is set from the very cycle on.
+    const auto possible = [&](can::Fault fault) {
+        return !readable || (status.faults & static_cast<std::uint16_t>(fault)) != 0;
+    };
+    const bool missing = possible(can::Fault::frame_missing);
+    const bool invalid = possible(can::Fault::frame_invalid);
     for (const History& h : histories_) {
         // The status counts late cycles, but a restart sets the count to 0.
         const bool restart = std::any_of(
@@ -172,11 +179,14 @@ void BoardTwin::find_candidates(std::size_t beats) {
             for (const bool overrun : {late, !late}) {
                 if (overrun != late && !restart) continue;
                 const std::size_t bus_count = h.bus.size() - unread;
-                for (std::size_t i = 0; i < std::min(beats, h.beats.size()); ++i)
-                    add_candidate(h, hal::BeatResult::ok, i, overrun, bus_count);
+                const std::size_t most = std::min(beats, h.beats.size());
+                for (std::size_t gone = 1; gone <= most; ++gone)
+                    add_candidate(h, hal::BeatResult::ok, gone, overrun, bus_count);
                 if (readable && status.detections != 0) continue;  // there was a frame to detect them in
-                add_candidate(h, hal::BeatResult::missing, 0, overrun, bus_count);
-                add_candidate(h, hal::BeatResult::invalid, 0, overrun, bus_count);
+                if (missing) add_candidate(h, hal::BeatResult::missing, 0, overrun, bus_count);
+                for (std::size_t gone = 1; gone <= most && invalid; ++gone)
+                    add_candidate(h, hal::BeatResult::invalid, gone, overrun, bus_count);
+                if (invalid && !h.met_old_bytes) add_candidate(h, hal::BeatResult::invalid, 0, overrun, bus_count);
             }
         }
     }
@@ -231,7 +241,8 @@ ListVerdict BoardTwin::settle(const std::vector<const Candidate*>& chosen, std::
     for (const Candidate* c : chosen) {
         const History& h = c->after;
         const bool known = std::any_of(next.begin(), next.end(), [&](const History& other) {
-            return other.beats == h.beats && other.bus == h.bus && other.replica->same_state(*h.replica);
+            return other.beats == h.beats && other.bus == h.bus && other.met_old_bytes == h.met_old_bytes &&
+                   other.replica->same_state(*h.replica);
         });
         if (!known && next.size() < kMaxHistories) next.push_back(h);
     }

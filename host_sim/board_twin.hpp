@@ -71,7 +71,8 @@ struct BoardTwinCounters {
 /// When a board looks at its inputs the bus does not tell: a beat frame or an ego motion that the PC sent at
 /// about the start of a cycle may belong to it or to the next, and it may take some cycles until that makes a
 /// difference. So replicas for all inputs the board can have had go on side by side: frames in the order they
-/// were sent, none taken twice. A list is identical if one of them says the same in every byte; those that do
+/// were sent, none taken twice. A damaged one is one of them too, but for a single one that bytes from before
+/// the run can have spoilt. A list is identical if one of them says the same in every byte; those that do
 /// not are dropped, and those that came to the same state are one. A wrong byte cannot hide in this: CRC,
 /// counter and cycle of every frame follow from the state, and there is a handful of inputs against 2^64
 /// values of a frame. What the board took shows in the counters.
@@ -99,7 +100,7 @@ class BoardTwin {
     /// Beat frames, CAN frames and histories kept at most. Of what is older the board has none left.
     static constexpr std::size_t kMaxBeats = 64;
     static constexpr std::size_t kMaxBus = 12;
-    static constexpr std::size_t kMaxHistories = 12;
+    static constexpr std::size_t kMaxHistories = 48;
     /// Beat frames the board may have taken next; all of kMaxBeats only when these explain nothing.
     static constexpr std::size_t kLikelyBeats = 2;
 
@@ -112,6 +113,7 @@ class BoardTwin {
         std::shared_ptr<const FirmwareReplica> replica;
         std::deque<std::shared_ptr<const SentBeat>> beats;  ///< not taken yet
         std::deque<can::Frame> bus;                         ///< not read yet
+        bool met_old_bytes = false;                         ///< a damaged frame was none of `beats`
         BoardTwinCounters counters = {};                    ///< those of the inputs
     };
     /// What it may have done in the current cycle.
@@ -124,7 +126,9 @@ class BoardTwin {
 
     [[nodiscard]] bool header_and_objects_there() const;
     void find_candidates(std::size_t beats);
-    void add_candidate(const History& before, hal::BeatResult beat, std::size_t beat_index, bool overrun,
+    /// `beats_gone`: so many of the beat frames sent the board will not take any more; the last of them is
+    /// the one it took, or had damaged.
+    void add_candidate(const History& before, hal::BeatResult beat, std::size_t beats_gone, bool overrun,
                        std::size_t bus_count);
     std::optional<ListVerdict> judge(bool whole);
     ListVerdict settle(const std::vector<const Candidate*>& chosen, std::string difference);

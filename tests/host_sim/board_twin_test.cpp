@@ -165,6 +165,51 @@ TEST(BoardTwin, InputsThatShowOnlyLaterAreNoDifference) {
     }
 }
 
+// The bit FrameInvalid is held for five cycles as well, and a board with a slow line leaves the next frame unanswered
+// for many: whether a cycle had a damaged frame or none shows late.
+TEST(BoardTwin, AFrameAfterADamagedOneMayBeLongOnItsWay) {
+    for (int ego_at = 1; ego_at < 8; ++ego_at) {
+        Bench b;
+        b.cycle({.beat = hal::BeatResult::missing});
+        can::Frame ego = b.ego(20'000);
+        b.send_beat();  // and comes damaged
+        for (int i = 0; i < 10; ++i) {
+            sim::CycleInputs inputs{.beat = hal::BeatResult::missing};
+            if (i == ego_at) inputs.bus = {&ego, 1};
+            b.cycle(inputs);
+        }
+        b.cycle({.beat = hal::BeatResult::invalid});
+        LONGS_EQUAL(0, b.twin.outstanding());
+        ego = b.ego(20'100);
+        const dsp::BeatFrame& second = b.send_beat();
+        for (int i = 0; i < 12; ++i) {
+            sim::CycleInputs inputs{.beat = hal::BeatResult::missing};
+            if (i == ego_at) inputs.bus = {&ego, 1};
+            b.cycle(inputs);
+        }
+        b.cycle({.beat = hal::BeatResult::ok, .frame = &second, .sequence = b.next - 1});
+        b.cycle({.beat = hal::BeatResult::missing});
+        b.finish();
+        LONGS_EQUAL(0, b.different());
+        LONGS_EQUAL(1, b.twin.counters().invalid);
+        LONGS_EQUAL(1, b.twin.counters().processed);
+        LONGS_EQUAL(0, b.twin.outstanding());
+    }
+}
+
+// Half a packet of an earlier run swallows the head of the first one, which is found all the same.
+TEST(BoardTwin, ADamagedFrameMayBeOneFromBeforeTheRun) {
+    Bench b;
+    b.cycle({.beat = hal::BeatResult::missing});
+    const dsp::BeatFrame& first = b.send_beat();
+    b.cycle({.beat = hal::BeatResult::invalid});
+    b.cycle({.beat = hal::BeatResult::ok, .frame = &first, .sequence = b.next - 1});
+    b.cycles(10);
+    b.finish();
+    LONGS_EQUAL(0, b.different());
+    LONGS_EQUAL(11, b.twin.counters().processed);
+}
+
 TEST(BoardTwin, LateCyclesAreRecognised) {
     Bench b;
     b.cycles(5);
