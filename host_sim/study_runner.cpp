@@ -15,7 +15,7 @@
 #include <system_error>
 #include <thread>
 
-#ifdef RADAR_WITH_MPI
+#if RADAR_WITH_MPI
 #include <mpi.h>
 #endif
 
@@ -147,7 +147,7 @@ class Progress {
 
 }  // namespace
 
-#ifdef RADAR_WITH_MPI
+#if RADAR_WITH_MPI
 
 StudyRanks::StudyRanks() {
     // Without mpirun there is nobody to talk to, and starting MPI would cost half a second.

@@ -30,7 +30,9 @@ double snr_for(const sim::FrontEnd& f, double amplitude) {
 
 /// Lee and Kim 2000's waveform, every figure written out: R(t) = R + v t at each sample, round trip delay,
 /// mixer.
-long double beat(double range, double rate, int chirp, int sample) {
+long double beat(double range_m, double rate_mps, int chirp, int sample) {
+    const auto range = static_cast<long double>(range_m);
+    const auto rate = static_cast<long double>(rate_mps);
     constexpr long double kLight = 299792458.0L;
     const long double sweep = 30e6L / 32e-6L;
     const long double u = sample / 2e6L;

@@ -109,6 +109,7 @@ TEST(Kalman, FixedPointInnovationKeepsItsErrorBounds) {
     // Expected: long double on the very same numbers, so that nothing but the arithmetic differs.
     using Matrix = Eigen::Matrix<long double, 2, 2>;
     using Vector = Eigen::Matrix<long double, 2, 1>;
+    const auto exact = [](const Real& x) { return static_cast<long double>(value(x)); };
     std::mt19937 random(4);
     std::uniform_real_distribution<double> u(-1, 1);
     long double worst_distance = 0;   // in parts of the bound
@@ -123,26 +124,26 @@ TEST(Kalman, FixedPointInnovationKeepsItsErrorBounds) {
         const Vec2<Real> r(scalar<Real>(std::pow(10, u(random)) * (trial % 2 == 0 ? 1 : 0.01)),
                            scalar<Real>(std::pow(10, u(random)) * (trial % 3 == 0 ? 1 : 0.01)));
         Matrix s;
-        s << value(p(0, 0)) + value(r[0]), value(p(0, 1)), value(p(0, 1)), value(p(1, 1)) + value(r[1]);
+        s << exact(p(0, 0)) + exact(r[0]), exact(p(0, 1)), exact(p(0, 1)), exact(p(1, 1)) + exact(r[1]);
         const Vec2<Real> nu(scalar<Real>(5 * u(random) * std::sqrt(static_cast<double>(s(0, 0)))),
                             scalar<Real>(5 * u(random) * std::sqrt(static_cast<double>(s(1, 1)))));
         const Innovation<Real> innovation(p, r);
         CHECK(innovation.valid());
         const Matrix inverse = s.inverse();
-        const Vector n(value(nu[0]), value(nu[1]));
+        const Vector n(exact(nu[0]), exact(nu[1]));
         const long double d2 = n.dot(inverse * n);
         const long double independent = 1 - s(0, 1) * s(0, 1) / (s(0, 0) * s(1, 1));
         const long double bound = std::ldexp(1.0L, -18) * (1 + d2) / independent;
         if (d2 < 500)
-            worst_distance = std::max(worst_distance, std::abs(value(innovation.distance2(nu)) - d2) / bound);
-        const Vector noise(value(r[0]), value(r[1]));
+            worst_distance = std::max(worst_distance, std::abs(exact(innovation.distance2(nu)) - d2) / bound);
+        const Vector noise(exact(r[0]), exact(r[1]));
         const Matrix diagonal = noise.asDiagonal();
         const Matrix posterior = diagonal - diagonal * inverse * diagonal;
         const Mat2<Real> out = innovation.posterior();
         for (int i = 0; i < 2; ++i) {
             for (int j = 0; j < 2; ++j)
                 worst_posterior =
-                    std::max(worst_posterior, std::ldexp(std::abs(value(out(i, j)) - posterior(i, j)), 22));
+                    std::max(worst_posterior, std::ldexp(std::abs(exact(out(i, j)) - posterior(i, j)), 22));
         }
     }
     std::printf("distance2 at %.3Lf of its bound, posterior within %.3Lf LSB (bar 2)\n", worst_distance,
