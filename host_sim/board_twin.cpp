@@ -64,7 +64,15 @@ std::vector<can::Frame> FirmwareReplica::run(const CycleInputs& inputs) {
 }
 
 bool FirmwareReplica::same_state(const FirmwareReplica& other) const {
-    return std::memcmp(&radar_, &other.radar_, sizeof radar_) == 0;
+    // Of the counters only these two are told on the bus.
+    const firmware::RadarCounters& mine = radar_.counters();
+    const firmware::RadarCounters& its = other.radar_.counters();
+    if (mine.overruns != its.overruns || mine.cycles != its.cycles) return false;
+    const auto* const a = reinterpret_cast<const std::byte*>(&radar_);
+    const auto* const b = reinterpret_cast<const std::byte*>(&other.radar_);
+    const auto at = static_cast<std::size_t>(reinterpret_cast<const std::byte*>(&mine) - a);
+    const std::size_t after = at + sizeof mine;
+    return std::memcmp(a, b, at) == 0 && std::memcmp(a + after, b + after, sizeof radar_ - after) == 0;
 }
 
 BoardTwin::BoardTwin(const firmware::RadarConfig& config)
@@ -186,7 +194,8 @@ void BoardTwin::find_candidates(std::size_t beats) {
                 if (missing) add_candidate(h, hal::BeatResult::missing, 0, overrun, bus_count);
                 for (std::size_t gone = 1; gone <= most && invalid; ++gone)
                     add_candidate(h, hal::BeatResult::invalid, gone, overrun, bus_count);
-                if (invalid && !h.met_old_bytes) add_candidate(h, hal::BeatResult::invalid, 0, overrun, bus_count);
+                if (invalid && !h.met_old_bytes)
+                    add_candidate(h, hal::BeatResult::invalid, 0, overrun, bus_count);
             }
         }
     }
@@ -244,8 +253,11 @@ ListVerdict BoardTwin::settle(const std::vector<const Candidate*>& chosen, std::
             return other.beats == h.beats && other.bus == h.bus && other.met_old_bytes == h.met_old_bytes &&
                    other.replica->same_state(*h.replica);
         });
-        if (!known && next.size() < kMaxHistories) next.push_back(h);
+        if (!known) next.push_back(h);
     }
+    // Damage is rare.
+    std::ranges::stable_sort(next, {}, [](const History& h) { return h.counters.invalid; });
+    if (next.size() > kMaxHistories) next.erase(next.begin() + kMaxHistories, next.end());
     histories_ = std::move(next);
     candidates_.clear();
     settled_ = true;

@@ -100,7 +100,7 @@ class BoardTwin {
     /// Beat frames, CAN frames and histories kept at most. Of what is older the board has none left.
     static constexpr std::size_t kMaxBeats = 64;
     static constexpr std::size_t kMaxBus = 12;
-    static constexpr std::size_t kMaxHistories = 48;
+    static constexpr std::size_t kMaxHistories = 24;
     /// Beat frames the board may have taken next; all of kMaxBeats only when these explain nothing.
     static constexpr std::size_t kLikelyBeats = 2;
 

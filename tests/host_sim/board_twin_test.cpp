@@ -165,10 +165,10 @@ TEST(BoardTwin, InputsThatShowOnlyLaterAreNoDifference) {
     }
 }
 
-// The bit FrameInvalid is held for five cycles as well, and a board with a slow line leaves the next frame unanswered
-// for many: whether a cycle had a damaged frame or none shows late.
+// The bit FrameInvalid is held for five cycles as well, and a board with a slow line leaves the next frame
+// unanswered for many: whether a cycle had a damaged frame or none shows late.
 TEST(BoardTwin, AFrameAfterADamagedOneMayBeLongOnItsWay) {
-    for (int ego_at = 1; ego_at < 8; ++ego_at) {
+    for (const int ego_at : {1, 2, 7}) {
         Bench b;
         b.cycle({.beat = hal::BeatResult::missing});
         can::Frame ego = b.ego(20'000);
