@@ -75,6 +75,16 @@ template <class Visit>
 void for_each_range_reference(const PowerMap& map, const CfarConfig& config, int r, int d, Visit visit) {
     const std::uint16_t* cell = map.cell[static_cast<std::size_t>(r)].data() + d;
     int remaining = 2 * config.range_reference;
+    const int reach = config.range_guard + config.spacing * config.range_reference;
+    if (r + reach < kRangeCells && r - reach >= config.first_range_cell) {
+        const std::ptrdiff_t step = std::ptrdiff_t{kDopplerCells} * config.spacing;
+        std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config.range_guard + 1);
+        for (; remaining > 0; remaining -= 2, rows += step) {
+            visit(cell + rows);
+            visit(cell - rows);
+        }
+        return;
+    }
     for (int distance = config.range_guard + 1; remaining > 0; distance += config.spacing) {
         const std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * distance;
         if (r + distance < kRangeCells) {
@@ -354,10 +364,11 @@ constexpr auto kNetwork = [] {
     return network;
 }();
 
-/// The rank-th smallest of the numbers in kPairsSorted pairs: sorts the two lanes at once and merges.
-std::uint16_t select_by_sorting(const packed::Pair* pairs, int rank) {
+/// The rank-th smallest of twice kPairsSorted numbers: sorts every other one and the rest at once, in two
+/// lanes, and merges.
+std::uint16_t select_by_sorting(const std::uint16_t* numbers, int rank) {
     std::array<packed::Pair, kPairsSorted> lanes{};
-    std::copy_n(pairs, lanes.size(), lanes.begin());
+    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { lanes[i] = packed::load(numbers + 2 * i); });
     [&lanes]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
         (packed::order(lanes[kNetwork[kIndex].low], lanes[kNetwork[kIndex].high]), ...);
     }
@@ -365,7 +376,7 @@ std::uint16_t select_by_sorting(const packed::Pair* pairs, int rank) {
     // Of i smallest of one lane and rank - i of the other the larger: the right i gives the least.
     std::array<packed::Pair, 1 + kPairsSorted> sorted;
     sorted[0] = 0;
-    std::copy(lanes.begin(), lanes.end(), sorted.begin() + 1);
+    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { sorted[1 + i] = lanes[i]; });
     packed::Pair least = packed::both(0xFFFF);
     int j = std::min(rank, kPairsSorted);
     for (int i = rank - j; i <= j; ++i, --j) {
@@ -377,14 +388,16 @@ std::uint16_t select_by_sorting(const packed::Pair* pairs, int rank) {
     return static_cast<std::uint16_t>(std::min(least & 0xFFFFU, least >> 16));
 }
 
-/// The same of any number of pairs: the largest number that is above fewer than `rank` of them, bit by bit.
-std::uint16_t select_by_counting(std::span<const packed::Pair> pairs, int rank) {
-    const auto most = 2 * pairs.size() - static_cast<std::size_t>(rank);
+/// The same of any even number of them: the largest one that is above fewer than `rank`, bit by bit.
+std::uint16_t select_by_counting(std::span<const std::uint16_t> numbers, int rank) {
+    const auto most = numbers.size() - static_cast<std::size_t>(rank);
     std::uint32_t selected = 0;
     for (std::uint32_t bit = 0x8000; bit != 0; bit /= 2) {
         packed::Pair not_below = 0;
         const packed::Pair tried = packed::both(static_cast<std::uint16_t>(selected | bit));
-        for (const packed::Pair pair : pairs) not_below += packed::at_least(pair, tried);
+        for (std::size_t i = 0; i < numbers.size(); i += 2) {
+            not_below += packed::at_least(packed::load(&numbers[i]), tried);
+        }
         if ((not_below & 0xFFFFU) + (not_below >> 16) > most) selected |= bit;
     }
     return static_cast<std::uint16_t>(selected);
@@ -393,26 +406,21 @@ std::uint16_t select_by_counting(std::span<const packed::Pair> pairs, int rank) 
 }  // namespace
 
 std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell) const {
-    std::array<packed::Pair, kMaxReferenceCells / 2> pairs;
-    std::size_t count = 0;
-    for_each_doppler_reference(
-        map, config_, range_cell, doppler_cell,
-        [&](std::uint16_t right, std::uint16_t left) { pairs[count++] = packed::pack_low(right, left); });
-    std::int32_t half = -1;
-    for_each_range_reference(map, config_, range_cell, doppler_cell, [&](const std::uint16_t* cell) {
-        if (half < 0) {
-            half = *cell;
-        } else {
-            pairs[count++] = packed::pack_low(half, *cell);
-            half = -1;
-        }
-    });
+    alignas(4) std::array<std::uint16_t, kMaxReferenceCells> cells;
+    std::uint16_t* end = cells.data();
+    for_each_doppler_reference(map, config_, range_cell, doppler_cell,
+                               [&end](std::uint16_t right, std::uint16_t left) {
+                                   packed::store(end, packed::pack_low(right, left));
+                                   end += 2;
+                               });
+    for_each_range_reference(map, config_, range_cell, doppler_cell,
+                             [&end](const std::uint16_t* cell) { *end++ = *cell; });
     std::int32_t selected = 0;
-    if (count <= kPairsSorted) {
-        while (count < kPairsSorted) pairs[count++] = packed::both(0xFFFF);
-        selected = select_by_sorting(pairs.data(), config_.rank);
+    if (end - cells.data() <= 2 * kPairsSorted) {
+        std::fill(end, cells.data() + 2 * kPairsSorted, std::uint16_t{0xFFFF});
+        selected = select_by_sorting(cells.data(), config_.rank);
     } else {
-        selected = select_by_counting({pairs.data(), count}, config_.rank);
+        selected = select_by_counting({cells.data(), end}, config_.rank);
     }
     return std::max<std::int32_t>(selected + noise_offset_, 0);
 }

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "dsp/fixed_point.hpp"
+
 #if defined(__ARM_FEATURE_SIMD32) && defined(__ARM_FEATURE_DSP)
 #include <arm_acle.h>
 #define DSP_PACKED_INTRINSICS 1
@@ -93,20 +95,17 @@ constexpr Pair half_add_j(Pair a, Pair b) {
 constexpr Pair half_sub_j(Pair a, Pair b) {
     return pack((lane0(a) + lane1(b)) >> 1, (lane1(a) - lane0(b)) >> 1);
 }
-constexpr std::int32_t clamp(std::int32_t v) {
-    return v > 32767 ? 32767 : (v < -32768 ? -32768 : v);
-}
 constexpr Pair saturated_add(Pair a, Pair b) {
-    return pack(clamp(lane0(a) + lane0(b)), clamp(lane1(a) + lane1(b)));
+    return pack(saturate16(lane0(a) + lane0(b)), saturate16(lane1(a) + lane1(b)));
 }
 constexpr Pair saturated_sub(Pair a, Pair b) {
-    return pack(clamp(lane0(a) - lane0(b)), clamp(lane1(a) - lane1(b)));
+    return pack(saturate16(lane0(a) - lane0(b)), saturate16(lane1(a) - lane1(b)));
 }
 constexpr Pair saturated_add_j(Pair a, Pair b) {
-    return pack(clamp(lane0(a) - lane1(b)), clamp(lane1(a) + lane0(b)));
+    return pack(saturate16(lane0(a) - lane1(b)), saturate16(lane1(a) + lane0(b)));
 }
 constexpr Pair saturated_sub_j(Pair a, Pair b) {
-    return pack(clamp(lane0(a) + lane1(b)), clamp(lane1(a) - lane0(b)));
+    return pack(saturate16(lane0(a) + lane1(b)), saturate16(lane1(a) - lane0(b)));
 }
 constexpr Pair largest(Pair a, Pair b) {
     return pack(lane0(a) > lane0(b) ? lane0(a) : lane0(b), lane1(a) > lane1(b) ? lane1(a) : lane1(b));
@@ -309,12 +308,6 @@ inline std::int32_t scale_0(std::int32_t a, Pair b) {
 }
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
     return __smlawt(a, static_cast<std::int32_t>(b), 0);
-}
-/// Clamped to 16 bits.
-inline std::int32_t clamp(std::int32_t v) {
-    std::int32_t result;
-    asm("ssat %0, #16, %1" : "=r"(result) : "r"(v));  // the compiler's __ssat changes signs on the way
-    return result;
 }
 #else
 using namespace portable;
