@@ -39,44 +39,52 @@ constexpr Cell unpack(Candidate candidate) {
             static_cast<std::int32_t>(candidate >> 16)};
 }
 
+/// Lets the candidate at `place` of a heap, the weakest on top, sink below the weaker ones.
+[[gnu::noinline]] void sink(CandidateList& heap, std::size_t place) {
+    const Candidate candidate = heap[place];
+    for (std::size_t child = 2 * place + 1; child < heap.size(); child = 2 * place + 1) {
+        if (child + 1 < heap.size() && heap[child + 1] < heap[child]) ++child;
+        if (candidate <= heap[child]) break;
+        heap[place] = heap[child];
+        place = child;
+    }
+    heap[place] = candidate;
+}
+
 /// Descending, by the method of Shell (1959) with the distances of Ciura (2001).
-void sort(Candidate* begin, Candidate* end) {
-    static_assert(kMaxCandidates <= 132);
-    for (const std::ptrdiff_t distance : {57, 23, 10, 4, 1}) {
-        for (Candidate* next = begin + std::min(distance, end - begin); next != end; ++next) {
-            const Candidate candidate = *next;
-            Candidate* place = next;
-            while (place - begin >= distance && place[-distance] < candidate) {
-                *place = place[-distance];
-                place -= distance;
+void sort(std::span<Candidate> list) {
+    for (const std::size_t distance : {57U, 23U, 10U, 4U, 1U}) {
+        for (std::size_t next = distance; next < list.size(); ++next) {
+            const Candidate candidate = list[next];
+            std::size_t place = next;
+            for (; place >= distance && list[place - distance] < candidate; place -= distance) {
+                list[place] = list[place - distance];
             }
-            *place = candidate;
+            list[place] = candidate;
         }
     }
 }
 
 /// Fills `list` with the strongest candidates in descending order. Returns how many; counts the rest.
 [[gnu::noinline]] int collect(const PowerMap& map, const CellMask& peaks, CandidateList& list, int& rest) {
-    const auto stronger = [](Candidate a, Candidate b) { return a > b; };
-    auto end = list.begin();
+    std::size_t count = 0;
     for (int r = 0; r < kRangeCells; ++r) {
-        const auto row = static_cast<std::size_t>(r);
-        for (std::uint64_t bits = peaks.row[row]; bits != 0; bits &= bits - 1) {
+        for (std::uint64_t bits = peaks.row[static_cast<std::size_t>(r)]; bits != 0; bits &= bits - 1) {
             const int d = std::countr_zero(bits);
             const Candidate candidate = pack({r, d, map.at(r, d)});
-            if (end != list.end()) {
-                *end++ = candidate;
+            if (count < list.size()) {
+                list[count++] = candidate;
                 continue;
             }
-            if (rest++ == 0) std::make_heap(list.begin(), end, stronger);  // the weakest on top
-            if (candidate < list.front()) continue;
-            std::pop_heap(list.begin(), end, stronger);
-            list.back() = candidate;
-            std::push_heap(list.begin(), end, stronger);
+            if (rest++ == 0) {
+                for (std::size_t place = count / 2; place > 0; --place) sink(list, place - 1);
+            }
+            if (candidate < list[0]) continue;
+            list[0] = candidate;
+            sink(list, 0);
         }
     }
-    const auto count = end - list.begin();
-    sort(list.data(), list.data() + count);
+    sort({list.data(), count});
     return static_cast<int>(count);
 }
 
@@ -129,11 +137,11 @@ using Columns = std::array<std::size_t, kTaps>;
 
 /// Five cells of a row: the real parts of those with even and with odd index times the conjugates of two
 /// rotations, over 2^down, to `taps`.
-template <class Load>
-void align_row(Load load, packed::Pair even, packed::Pair odd, int down, Taps& taps) {
+inline void align_row(const Complex16* cells, const Columns& columns, packed::Pair even, packed::Pair odd,
+                      int down, Taps& taps) {
     static_assert(kTaps == 5);
-    const auto aligned = [&load, down](std::size_t j, packed::Pair rotation) {
-        return saturate16(packed::dot(load(j), rotation, 0) >> down);
+    const auto aligned = [&](std::size_t j, packed::Pair rotation) {
+        return saturate16(packed::dot(packed::load(&cells[columns[j]].re), rotation, 0) >> down);
     };
     packed::store(&taps[0], packed::pack_low(aligned(0, even), aligned(1, odd)));
     packed::store(&taps[2], packed::pack_low(aligned(2, even), aligned(3, odd)));
@@ -141,24 +149,17 @@ void align_row(Load load, packed::Pair even, packed::Pair odd, int down, Taps& t
 }
 
 /// The same for a row below cell 0, above the last one, or with another, far stronger target: down < 0.
-[[gnu::noinline]] void align_other_row(const Spectrum& spectrum, int range, const Columns& columns,
+[[gnu::noinline]] void align_other_row(const Spectrum& spectrum, int range, Columns columns,
                                        packed::Pair even, packed::Pair odd, int down, Taps& taps) {
     taps = {};
     if (range >= kRangeCells) return;  // not kept
-    const auto& cells = spectrum.row[static_cast<std::size_t>(std::abs(range))];
-    const int shift = std::clamp(down, 0, 31);
-    if (range < 0) {  // a real signal's spectrum: X[-r, -d] = conj X[r, d]
-        const auto conjugate = [](packed::Pair x) {
-            return packed::pack(packed::lane0(x), -packed::lane1(x));
-        };
-        align_row(
-            [&](std::size_t j) {
-                return packed::load(&cells[(kDopplerCells - columns[j]) & (kDopplerCells - 1)].re);
-            },
-            conjugate(even), conjugate(odd), shift, taps);
-    } else {
-        align_row([&](std::size_t j) { return packed::load(&cells[columns[j]].re); }, even, odd, shift, taps);
+    if (range < 0) {                   // a real signal's spectrum: X[-r, -d] = conj X[r, d]
+        for (std::size_t& column : columns) column = (kDopplerCells - column) & (kDopplerCells - 1);
+        even = packed::pack(packed::lane0(even), -packed::lane1(even));
+        odd = packed::pack(packed::lane0(odd), -packed::lane1(odd));
     }
+    align_row(spectrum.row[static_cast<std::size_t>(std::abs(range))].data(), columns, even, odd,
+              std::clamp(down, 0, 31), taps);
     const int up = std::clamp(-down, 0, 15);
     for (std::int16_t& tap : taps) tap = static_cast<std::int16_t>(saturate16(tap * (1 << up)));
 }
@@ -191,9 +192,7 @@ Patch align(const Spectrum& spectrum, const Cell& peak, bool mirror_range, bool 
         const auto row = static_cast<std::size_t>(std::min(std::abs(range), kRangeCells - 1));
         const int row_down = exponent - spectrum.row_exponent[row];
         if (static_cast<unsigned>(range) < kRangeCells && row_down >= 0) {
-            const Complex16* cells = spectrum.row[row].data();
-            align_row([cells, &columns](std::size_t j) { return packed::load(&cells[columns[j]].re); }, even,
-                      odd, std::min(row_down, 31), taps);
+            align_row(spectrum.row[row].data(), columns, even, odd, std::min(row_down, 31), taps);
         } else {
             align_other_row(spectrum, range, columns, even, odd, row_down, taps);
         }

@@ -75,16 +75,6 @@ template <class Visit>
 void for_each_range_reference(const PowerMap& map, const CfarConfig& config, int r, int d, Visit visit) {
     const std::uint16_t* cell = map.cell[static_cast<std::size_t>(r)].data() + d;
     int remaining = 2 * config.range_reference;
-    const int reach = config.range_guard + config.spacing * config.range_reference;
-    if (r + reach < kRangeCells && r - reach >= config.first_range_cell) {
-        const std::ptrdiff_t step = std::ptrdiff_t{kDopplerCells} * config.spacing;
-        std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config.range_guard + 1);
-        for (; remaining > 0; remaining -= 2, rows += step) {
-            visit(cell + rows);
-            visit(cell - rows);
-        }
-        return;
-    }
     for (int distance = config.range_guard + 1; remaining > 0; distance += config.spacing) {
         const std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * distance;
         if (r + distance < kRangeCells) {
@@ -98,12 +88,9 @@ void for_each_range_reference(const PowerMap& map, const CfarConfig& config, int
     }
 }
 
-/// One bit a cell of a row: those with even and with odd Doppler index, cells 2i and 2i+1 at bit 31-i. So
-/// compares shift in at the low end, and a count of leading zeros finds the cell.
-struct RowBits {
-    std::uint32_t even = 0;
-    std::uint32_t odd = 0;
-};
+/// One bit a cell of a row: those with even Doppler index, then those with odd, cells 2i and 2i+1 at bit
+/// 31-i. So compares shift in at the low end, and a count of leading zeros finds the cell.
+using RowBits = std::array<std::uint32_t, 2>;
 
 /// Joins the bits of the two halves of a row; the even cells of a half are in the low lane.
 constexpr RowBits join(packed::Pair first, packed::Pair second) {
@@ -200,11 +187,11 @@ std::uint32_t many_set(std::uint32_t bits, int right, int left, std::uint32_t mo
 /// the other kind, even or odd. `more`: see many_set().
 RowBits not_ruled_out(const RowBits& filled, int first, std::uint32_t more) {
     if (first % 2 == 0) {
-        return {many_set(~filled.even, first / 2, first / 2, more),
-                many_set(~filled.odd, first / 2, first / 2, more)};
+        return {many_set(~filled[0], first / 2, first / 2, more),
+                many_set(~filled[1], first / 2, first / 2, more)};
     }
-    return {many_set(~filled.odd, first / 2, first / 2 + 1, more),
-            many_set(~filled.even, first / 2 + 1, first / 2, more)};
+    return {many_set(~filled[1], first / 2, first / 2 + 1, more),
+            many_set(~filled[0], first / 2 + 1, first / 2, more)};
 }
 
 /// The neighbours of a row's cells. Of equals the one later in memory is larger.
@@ -289,9 +276,9 @@ RowBits maxima(const MapRow& row) {
     }
     // Not below the one to their left; cell 0: above it.
     RowBits rises = join(bits[0], bits[1]);
-    if (row[0] == row[kDopplerCells - 1]) rises.even &= ~(std::uint32_t{1} << 31);
+    if (row[0] == row[kDopplerCells - 1]) rises[0] &= ~(std::uint32_t{1} << 31);
     // And the next one does not rise.
-    return {rises.even & ~rises.odd, rises.odd & ~std::rotl(rises.even, 1)};
+    return {rises[0] & ~rises[1], rises[1] & ~std::rotl(rises[0], 1)};
 }
 
 }  // namespace
@@ -462,7 +449,7 @@ constexpr int kUnrolled = 8;
         const std::uint16_t* pairs = parity.pair(odd);
         const std::uint16_t* rightmost = parity.pair(odd + first);
         const std::uint16_t* leftmost = parity.pair(odd - first);
-        for (std::uint32_t rest = odd == 0 ? candidates.even : candidates.odd; rest != 0;) {
+        for (std::uint32_t rest = candidates[static_cast<std::size_t>(odd)]; rest != 0;) {
             const int i = take_first(rest);
             const std::uint32_t next = std::uint32_t{0x4000'0000} >> i;
             const packed::Pair wanted = (rest & next) == 0 ? packed::pack(1, 0) : packed::both(1);
@@ -516,42 +503,34 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
         if (enough) {
             const RowCompares compares = compare_row(row, level8, top8);
             candidates = not_ruled_out(compares.filled, config.doppler_guard + 1, more);
-            candidates.even |= compares.high.even;
-            candidates.odd |= compares.high.odd;
+            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] |= compares.high[odd];
         }
         // A few are compared with their neighbours one by one, many by comparing the whole row.
-        const bool compared = !few<6>(candidates.even | candidates.odd);
+        const bool compared = !few<6>(candidates[0] | candidates[1]);
         if (compared) {
             const RowBits in_row = maxima(row);
-            candidates.even &= in_row.even;
-            candidates.odd &= in_row.odd;
+            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_row[odd];
         }
         const Neighbours neighbours(map, r);
-        const auto largest = [&](std::uint32_t bits, int odd) {
-            std::uint32_t kept = bits;
-            while (bits != 0) {
-                const int i = take_first(bits);
-                const int d = 2 * i + odd;
+        for (std::size_t odd = 0; odd < 2; ++odd) {
+            for (std::uint32_t rest = candidates[odd]; rest != 0;) {
+                const int i = take_first(rest);
+                const int d = 2 * i + static_cast<int>(odd);
                 if ((!compared && !neighbours.tops_its_row(d)) || !neighbours.tops_its_columns(d)) {
-                    kept &= ~(std::uint32_t{0x8000'0000} >> i);
+                    candidates[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
                 }
             }
-            return kept;
-        };
-        candidates = {largest(candidates.even, 0), largest(candidates.odd, 1)};
-        std::uint64_t& found = peaks.row[static_cast<std::size_t>(r)];
-        if (in_pairs && !few<3>(candidates.even | candidates.odd)) {
-            found = detected_in_pairs(map, cfar, r, candidates);
+        }
+        if (in_pairs && !few<3>(candidates[0] | candidates[1])) {
+            peaks.row[static_cast<std::size_t>(r)] = detected_in_pairs(map, cfar, r, candidates);
             continue;
         }
-        const auto test = [&](std::uint32_t rest, int odd) {
-            while (rest != 0) {
-                const int d = 2 * take_first(rest) + odd;
-                if (cfar.detects(map, r, d)) found |= std::uint64_t{1} << d;
+        for (std::size_t odd = 0; odd < 2; ++odd) {
+            while (candidates[odd] != 0) {
+                const int d = 2 * take_first(candidates[odd]) + static_cast<int>(odd);
+                if (cfar.detects(map, r, d)) peaks.set(r, d);
             }
-        };
-        test(candidates.even, 0);
-        test(candidates.odd, 1);
+        }
     }
 }
 
