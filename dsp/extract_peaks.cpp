@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdlib>
+#include <span>
 
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
@@ -38,26 +39,53 @@ constexpr Cell unpack(Candidate candidate) {
             static_cast<std::int32_t>(candidate >> 16)};
 }
 
-/// Fills `list` with the strongest candidates in descending order. Returns how many; counts the rest.
-int collect(const PowerMap& map, const CellMask& peaks, CandidateList& list, int& rest) {
-    const auto stronger = [](Candidate a, Candidate b) { return a > b; };
-    auto end = list.begin();  // a heap, the weakest on top
-    for (int r = 0; r < kRangeCells; ++r) {
-        const auto row = static_cast<std::size_t>(r);
-        for (std::uint64_t bits = peaks.row[row]; bits != 0; bits &= bits - 1) {
-            const int d = std::countr_zero(bits);
-            const Candidate candidate = pack({r, d, map.at(r, d)});
-            if (end == list.end()) {
-                ++rest;
-                if (candidate < list.front()) continue;
-                std::pop_heap(list.begin(), end--, stronger);
+/// Lets the candidate at `place` of a heap, the weakest on top, sink below the weaker ones.
+[[gnu::noinline]] void sink(CandidateList& heap, std::size_t place) {
+    const Candidate candidate = heap[place];
+    for (std::size_t child = 2 * place + 1; child < heap.size(); child = 2 * place + 1) {
+        if (child + 1 < heap.size() && heap[child + 1] < heap[child]) ++child;
+        if (candidate <= heap[child]) break;
+        heap[place] = heap[child];
+        place = child;
+    }
+    heap[place] = candidate;
+}
+
+/// Descending, by the method of Shell (1959) with the distances of Ciura (2001).
+void sort(std::span<Candidate> list) {
+    for (const std::size_t distance : {57U, 23U, 10U, 4U, 1U}) {
+        for (std::size_t next = distance; next < list.size(); ++next) {
+            const Candidate candidate = list[next];
+            std::size_t place = next;
+            for (; place >= distance && list[place - distance] < candidate; place -= distance) {
+                list[place] = list[place - distance];
             }
-            *end++ = candidate;
-            std::push_heap(list.begin(), end, stronger);
+            list[place] = candidate;
         }
     }
-    std::sort_heap(list.begin(), end, stronger);
-    return static_cast<int>(end - list.begin());
+}
+
+/// Fills `list` with the strongest candidates in descending order. Returns how many; counts the rest.
+[[gnu::noinline]] int collect(const PowerMap& map, const CellMask& peaks, CandidateList& list, int& rest) {
+    std::size_t count = 0;
+    for (int r = 0; r < kRangeCells; ++r) {
+        for (std::uint64_t bits = peaks.row[static_cast<std::size_t>(r)]; bits != 0; bits &= bits - 1) {
+            const int d = std::countr_zero(bits);
+            const Candidate candidate = pack({r, d, map.at(r, d)});
+            if (count < list.size()) {
+                list[count++] = candidate;
+                continue;
+            }
+            if (rest++ == 0) {
+                for (std::size_t place = count / 2; place > 0; --place) sink(list, place - 1);
+            }
+            if (candidate < list[0]) continue;
+            list[0] = candidate;
+            sink(list, 0);
+        }
+    }
+    sort({list.data(), count});
+    return static_cast<int>(count);
 }
 
 /// Five neighbouring cells along an axis, and a zero.
@@ -71,16 +99,70 @@ std::int32_t weigh(const Taps& cells, const WindowResponse::Weights& weights) {
     return packed::dot(packed::load(&cells[4]), packed::load(&weights[4]), sum);
 }
 
+/// Both sums of a lobe.
+struct Estimate {
+    std::int32_t amplitude;
+    std::int32_t offset;
+};
+Estimate weigh(const Taps& cells, const WindowResponse::Lobe& lobe) {
+    static_assert(sizeof lobe == 6 * sizeof(packed::Pair));
+    packed::Pair a0 = 0;
+    packed::Pair a2 = 0;
+    packed::Pair a4 = 0;
+    packed::Pair g0 = 0;
+    packed::Pair g2 = 0;
+    packed::Pair g4 = 0;
+    packed::load_pair(&lobe.amplitude[0], a0, a2);
+    packed::load_pair(&lobe.amplitude[4], a4, g0);
+    packed::load_pair(&lobe.offset[2], g2, g4);
+    const packed::Pair s0 = packed::load(&cells[0]);
+    const packed::Pair s2 = packed::load(&cells[2]);
+    const packed::Pair s4 = packed::load(&cells[4]);
+    return {packed::dot(s4, a4, packed::dot(s2, a2, packed::dot(s0, a0, 0))),
+            packed::dot(s4, g4, packed::dot(s2, g2, packed::dot(s0, g0, 0)))};
+}
+
 /// The cells around a peak with the peak's phase and the lobe's alternating sign taken off: a lone target is
 /// real and positive there, the peak cell at least 2^13 and below 2^14, rounded down to one. What is more
 /// than twice that saturates; it is another target's. Mirrored along an axis where the target lies on the
 /// lower side of the peak cell, so that offsets are positive.
 struct Patch {
     static constexpr int kUnitBits = 14;
-    alignas(4) std::array<Taps, kTaps> along_doppler{};  ///< [range cell]
-    alignas(4) std::array<Taps, kTaps> along_range{};    ///< [Doppler cell], the same cells
-    std::int32_t log2_unit = 0;                          ///< of the peak cell, Q6.10
+    alignas(4) std::array<Taps, kTaps> along_doppler;  ///< [range cell]
+    alignas(4) Taps along_range;                       ///< through the peak cell
+    std::int32_t log2_unit;                            ///< of the peak cell, Q6.10
 };
+
+using Columns = std::array<std::size_t, kTaps>;
+
+/// Five cells of a row: the real parts of those with even and with odd index times the conjugates of two
+/// rotations, over 2^down, to `taps`.
+inline void align_row(const Complex16* cells, const Columns& columns, packed::Pair even, packed::Pair odd,
+                      int down, Taps& taps) {
+    static_assert(kTaps == 5);
+    const auto aligned = [&](std::size_t j, packed::Pair rotation) {
+        return saturate16(packed::dot(packed::load(&cells[columns[j]].re), rotation, 0) >> down);
+    };
+    packed::store(&taps[0], packed::pack_low(aligned(0, even), aligned(1, odd)));
+    packed::store(&taps[2], packed::pack_low(aligned(2, even), aligned(3, odd)));
+    packed::store(&taps[4], packed::pack_low(aligned(4, even), 0));
+}
+
+/// The same for a row below cell 0, above the last one, or with another, far stronger target: down < 0.
+[[gnu::noinline]] void align_other_row(const Spectrum& spectrum, int range, Columns columns,
+                                       packed::Pair even, packed::Pair odd, int down, Taps& taps) {
+    taps = {};
+    if (range >= kRangeCells) return;  // not kept
+    if (range < 0) {                   // a real signal's spectrum: X[-r, -d] = conj X[r, d]
+        for (std::size_t& column : columns) column = (kDopplerCells - column) & (kDopplerCells - 1);
+        even = packed::pack(packed::lane0(even), -packed::lane1(even));
+        odd = packed::pack(packed::lane0(odd), -packed::lane1(odd));
+    }
+    align_row(spectrum.row[static_cast<std::size_t>(std::abs(range))].data(), columns, even, odd,
+              std::clamp(down, 0, 31), taps);
+    const int up = std::clamp(-down, 0, 15);
+    for (std::int16_t& tap : taps) tap = static_cast<std::int16_t>(saturate16(tap * (1 << up)));
+}
 
 Patch align(const Spectrum& spectrum, const Cell& peak, bool mirror_range, bool mirror_doppler) {
     const auto peak_row = static_cast<std::size_t>(peak.range);
@@ -93,45 +175,29 @@ Patch align(const Spectrum& spectrum, const Cell& peak, bool mirror_range, bool 
     const int down = static_cast<int>(std::bit_width(power)) - Patch::kUnitBits;
     Patch patch;
     patch.log2_unit = log2_q10(power) - down * kLogOne;
-    packed::Pair turn = packed::pack(re, im);
-    packed::Pair turn_and_change_sign = packed::pack(-re, -im);
+    patch.along_range[kTaps] = 0;
     const int range_step = mirror_range ? -1 : 1;
     const int doppler_step = mirror_doppler ? -1 : 1;
+    const int exponent = down + spectrum.row_exponent[peak_row];
+    const auto column = [&peak, doppler_step](int j) {
+        return static_cast<std::size_t>(peak.doppler + j * doppler_step) & (kDopplerCells - 1);
+    };
+    const Columns columns{column(-2), column(-1), column(0), column(1), column(2)};
+    // Cells of even and of odd distance to the peak have opposite signs.
+    packed::Pair even = packed::pack(re, im);
+    packed::Pair odd = packed::pack(-re, -im);
     int range = peak.range - range_step * kReach;
     for (std::size_t i = 0; i < kTaps; ++i, range += range_step) {
-        // A real signal's spectrum below cell 0: X[-r, -d] = conj X[r, d]. Above the last row it is not kept.
-        const bool below = range < 0;
-        const auto row = static_cast<std::size_t>(below ? -range : range);
-        if (row < kRangeCells) {
-            const int row_down = down + spectrum.row_exponent[peak_row] - spectrum.row_exponent[row];
-            const int shift_down = std::clamp(row_down, 0, 31);
-            const int shift_up = std::clamp(-row_down, 0, 15);  // a row with another, far stronger target
-            const Complex16* cells = spectrum.row[row].data();
-            int column = below ? -peak.doppler + doppler_step * kReach : peak.doppler - doppler_step * kReach;
-            const int column_step = below ? -doppler_step : doppler_step;
-            const auto place = [&](std::size_t j, packed::Pair rotation) {
-                const packed::Pair x =
-                    packed::load(&cells[static_cast<std::size_t>(column) & (kDopplerCells - 1)].re);
-                const std::int32_t aligned = packed::dot(x, rotation, 0) >> shift_down;
-                const auto cell =
-                    static_cast<std::int16_t>(packed::clamp(packed::clamp(aligned) * (1 << shift_up)));
-                patch.along_doppler[i][j] = cell;
-                patch.along_range[j][i] = cell;
-                column += column_step;
-            };
-            const auto conjugate = [below](packed::Pair x) {
-                return below ? packed::pack(packed::lane0(x), -packed::lane1(x)) : x;
-            };
-            const packed::Pair even = conjugate(turn);
-            const packed::Pair odd = conjugate(turn_and_change_sign);
-            static_assert(kTaps == 5);
-            place(0, even);
-            place(1, odd);
-            place(2, even);
-            place(3, odd);
-            place(4, even);
+        Taps& taps = patch.along_doppler[i];
+        const auto row = static_cast<std::size_t>(std::min(std::abs(range), kRangeCells - 1));
+        const int row_down = exponent - spectrum.row_exponent[row];
+        if (static_cast<unsigned>(range) < kRangeCells && row_down >= 0) {
+            align_row(spectrum.row[row].data(), columns, even, odd, std::min(row_down, 31), taps);
+        } else {
+            align_other_row(spectrum, range, columns, even, odd, row_down, taps);
         }
-        std::swap(turn, turn_and_change_sign);
+        patch.along_range[i] = taps[kReach];
+        std::swap(even, odd);
     }
     return patch;
 }
@@ -145,44 +211,114 @@ class Guess {
               (offset_q15 + kStepQ15 / 2) >> (15 - std::countr_zero(unsigned{WindowResponse::kGridPerCell})),
               0, WindowResponse::kGrid - 1)) {}
 
-    [[nodiscard]] std::int32_t amplitude(const Taps& taps) const {
-        return weigh(taps, response_.amplitude[index()]);
-    }
-    /// Guess plus sum g s / A, the quotient within 2^-15, at most kFarthestQ15 either way. `amplitude`: A.
-    [[nodiscard]] std::int32_t refined_q15(const Taps& taps, std::int32_t amplitude) const {
+    [[nodiscard]] std::int32_t amplitude(const Taps& taps) const { return weigh(taps, lobe().amplitude); }
+    /// Guess plus sum g s / A, the quotient within 2^-15, at most kFarthestQ15 either way.
+    [[nodiscard]] std::int32_t refined_q15(const Estimate& estimate) const {
+        const std::int32_t amplitude = estimate.amplitude;
         if (amplitude <= 0) return 0;
-        const std::int32_t offset = weigh(taps, response_.offset[index()]);
         std::int32_t step = 1 << 15;
-        if (offset <= -amplitude) {
+        if (estimate.offset <= -amplitude) {
             step = -step;
-        } else if (offset < amplitude) {
+        } else if (estimate.offset < amplitude) {
             const int up = std::countl_zero(static_cast<std::uint32_t>(amplitude)) - 1;
-            step = (offset * (1 << up)) / (amplitude * (1 << up) >> 15);
+            step = (estimate.offset * (1 << up)) / (amplitude * (1 << up) >> 15);
         }
         return std::clamp(index_ * kStepQ15 + step, -kFarthestQ15, kFarthestQ15);
     }
-    [[nodiscard]] std::int32_t refined_q15(const Taps& taps) const {
-        return refined_q15(taps, amplitude(taps));
-    }
+    [[nodiscard]] Estimate estimate(const Taps& taps) const { return weigh(taps, lobe()); }
+    [[nodiscard]] std::int32_t refined_q15(const Taps& taps) const { return refined_q15(estimate(taps)); }
     /// The amplitudes of five lines of cells.
-    [[nodiscard]] Taps profile(const std::array<Taps, kTaps>& lines) const {
-        Taps out{};
-        constexpr int kBits = WindowResponse::kWeightBits;
-        for (std::size_t i = 0; i < kTaps; ++i) {
-            out[i] = saturate16((amplitude(lines[i]) + (1 << (kBits - 1))) >> kBits);
-        }
-        return out;
+    [[nodiscard]] Taps profile_of_lines(const std::array<Taps, kTaps>& lines) const {
+        return rounded({amplitude(lines[0]), amplitude(lines[1]), amplitude(lines[2]), amplitude(lines[3]),
+                        amplitude(lines[4])});
     }
-    [[nodiscard]] std::uint32_t amplitude_variance() const { return response_.amplitude_variance[index()]; }
-    [[nodiscard]] std::uint32_t offset_variance() const { return response_.offset_variance[index()]; }
+    /// The amplitudes across them.
+    [[nodiscard]] Taps profile_across(const std::array<Taps, kTaps>& lines) const {
+        std::array<std::int32_t, kTaps> sum{};
+        const auto add = [&](std::size_t i, auto multiply_low, auto multiply_high) {
+            const packed::Pair weight = packed::load(&lobe().amplitude[i & ~std::size_t{1}]);
+            const packed::Pair first = packed::load(&lines[i][0]);
+            const packed::Pair second = packed::load(&lines[i][2]);
+            sum[0] = multiply_low(first, weight, sum[0]);
+            sum[1] = multiply_high(first, weight, sum[1]);
+            sum[2] = multiply_low(second, weight, sum[2]);
+            sum[3] = multiply_high(second, weight, sum[3]);
+            sum[4] = multiply_low(packed::load(&lines[i][4]), weight, sum[4]);
+        };
+        add(0, packed::multiply_00, packed::multiply_10);
+        add(1, packed::multiply_01, packed::multiply_11);
+        add(2, packed::multiply_00, packed::multiply_10);
+        add(3, packed::multiply_01, packed::multiply_11);
+        add(4, packed::multiply_00, packed::multiply_10);
+        return rounded(sum);
+    }
+    /// log2 of the variances in WindowResponse.
+    [[nodiscard]] std::int32_t amplitude_variance() const { return response_.amplitude_variance[index()]; }
+    [[nodiscard]] std::int32_t offset_variance() const { return response_.offset_variance[index()]; }
 
   private:
     static constexpr std::int32_t kStepQ15 = (1 << 15) / WindowResponse::kGridPerCell;
     /// A peak of one target lies within half a cell of the largest cell; noise moves it a little further.
     static constexpr std::int32_t kFarthestQ15 = (3 << 15) / 4;
+    [[nodiscard]] const WindowResponse::Lobe& lobe() const { return response_.lobe[index()]; }
     [[nodiscard]] std::size_t index() const { return static_cast<std::size_t>(index_); }
+    static Taps rounded(const std::array<std::int32_t, kTaps>& sum) {
+        constexpr int kBits = WindowResponse::kWeightBits;
+        const auto tap = [&sum](std::size_t i) { return saturate16<kBits>(sum[i] + (1 << (kBits - 1))); };
+        Taps taps;
+        packed::store(&taps[0], packed::pack_low(tap(0), tap(1)));
+        packed::store(&taps[2], packed::pack_low(tap(2), tap(3)));
+        packed::store(&taps[4], packed::pack_low(tap(4), 0));
+        return taps;
+    }
     const WindowResponse& response_;
     std::int32_t index_;
+};
+
+/// Which maxima are no targets beside others.
+class Sidelobes {
+  public:
+    Sidelobes(const WindowResponse& range, const WindowResponse& doppler, const PeakConfig& config)
+        : range_(range),
+          doppler_(doppler),
+          margin_(log2_from_cdb(config.sidelobe_margin_cdb)),
+          dynamic_range_(log2_from_cdb(config.dynamic_range_cdb)),
+          strongest_(std::max(range.sidelobe[2], doppler.sidelobe[2])) {}
+
+    /// Whether sidelobes of `targets`, the strongest first, explain `peak`, no neighbour of theirs. Targets
+    /// reach any distance; what is far below the strongest one is never believed.
+    [[nodiscard, gnu::noinline]] bool explain(const Cell& peak, std::span<const Candidate> targets) const {
+        if (targets.empty()) return false;
+        if (peak.power < unpack(targets[0]).power - dynamic_range_) return true;
+        const std::int32_t over_margin = peak.power - margin_;
+        // A sidelobe is at most strongest_ (the mirrored spectrum begins at cell 2).
+        const std::int32_t weakest_target = peak.range >= 2 ? over_margin - strongest_ : -1;
+        const std::int16_t* range_response = range_.sidelobe.data();
+        const std::int16_t* doppler_response = doppler_.sidelobe.data();
+        const auto distance = [](int cells) { return static_cast<std::size_t>(cells) & (kWindowLength - 1); };
+        for (const Candidate candidate : targets) {
+            const Cell target = unpack(candidate);
+            if (target.power <= weakest_target) return false;  // as are the rest
+            const std::int32_t excess = over_margin - target.power;
+            const std::int32_t range = range_response[distance(target.range - peak.range)];
+            // A real signal's other half: the spectrum at -range, -Doppler.
+            const std::int32_t range_mirrored = range_response[target.range + peak.range];
+            // What is too weak at the same Doppler shift is weaker at any other: nearly all pairs end here.
+            if (excess >= range && excess >= range_mirrored) continue;
+            if (excess < range + doppler_response[distance(target.doppler - peak.doppler)] ||
+                excess < range_mirrored + doppler_response[distance(target.doppler + peak.doppler)]) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+  private:
+    const WindowResponse& range_;
+    const WindowResponse& doppler_;
+    std::int32_t margin_;  ///< log2 of power, Q6.10, as the others
+    std::int32_t dynamic_range_;
+    std::int32_t strongest_;
 };
 
 /// Place and quality of a peak between the cells.
@@ -204,8 +340,8 @@ std::int32_t offset_from_below(const WindowResponse& response, std::int32_t rati
     return (static_cast<std::int32_t>(i) - WindowResponse::kGridPerCell / 2) * kStepQ15;
 }
 
-Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
-             const WindowResponse& range_response, const WindowResponse& doppler_response) {
+[[gnu::noinline]] Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
+                               const WindowResponse& range_response, const WindowResponse& doppler_response) {
     const bool has_range_above = peak.range + kReach < kRangeCells;
     Place place;
     bool mirror_range = false;
@@ -226,26 +362,24 @@ Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
         place.doppler_q15 =
             Guess(doppler_response, place.doppler_q15).refined_q15(patch.along_doppler[kReach]);
         if (has_range_above) {
-            place.range_q15 = Guess(range_response, place.range_q15).refined_q15(patch.along_range[kReach]);
+            place.range_q15 = Guess(range_response, place.range_q15).refined_q15(patch.along_range);
         }
     }
     const Guess range(range_response, place.range_q15);
     const Guess doppler(doppler_response, place.doppler_q15);
-    const Taps doppler_profile = range.profile(patch.along_range);
-    const std::int32_t peak_amplitude = doppler.amplitude(doppler_profile);
-    place.doppler_q15 = doppler.refined_q15(doppler_profile, peak_amplitude);
-    if (has_range_above) place.range_q15 = range.refined_q15(doppler.profile(patch.along_doppler));
+    const Estimate estimate = doppler.estimate(range.profile_across(patch.along_doppler));
+    place.doppler_q15 = doppler.refined_q15(estimate);
+    if (has_range_above) place.range_q15 = range.refined_q15(doppler.profile_of_lines(patch.along_doppler));
     if (mirror_range) place.range_q15 = -place.range_q15;
     if (mirror_doppler) place.doppler_q15 = -place.doppler_q15;
     // Noise adds (g'Cg)(a'Ca) / 2A^2 to the offset, A the lobe's amplitude and not that of the peak cell.
-    const auto log2 = [](std::uint32_t v) { return log2_q10(std::max<std::uint32_t>(v, 1)); };
     const std::int32_t amplitude =
-        log2(static_cast<std::uint32_t>(std::max(peak_amplitude, std::int32_t{1}))) -
+        log2_q10(static_cast<std::uint32_t>(std::max(estimate.amplitude, std::int32_t{1}))) -
         WindowResponse::kWeightBits * kLogOne;
     const std::int32_t lobe =
         2 * (patch.log2_unit - amplitude) - (2 * WindowResponse::kWeightBits + 1) * kLogOne;
-    place.range_variance = lobe + log2(range.offset_variance()) + log2(doppler.amplitude_variance());
-    place.doppler_variance = lobe + log2(doppler.offset_variance()) + log2(range.amplitude_variance());
+    place.range_variance = lobe + range.offset_variance() + doppler.amplitude_variance();
+    place.doppler_variance = lobe + doppler.offset_variance() + range.amplitude_variance();
     if (!has_range_above) place.range_variance += 3 * kLogOne;  // one cell of the four, and a table's step
     return place;
 }
@@ -269,39 +403,13 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
                    const CellScale& scale, DetectionList& detections) {
     const WindowResponse& range_response = window_response(range_window);
     const WindowResponse& doppler_response = window_response(doppler_window);
-    const std::int32_t margin = log2_from_cdb(config.sidelobe_margin_cdb);
     const std::int32_t min_snr = log2_from_cdb(config.min_snr_cdb);
-    const std::int32_t dynamic_range = log2_from_cdb(config.dynamic_range_cdb);
-    // The spectrum is cyclic: distances 0..32.
-    const auto fold = [](int distance) {
-        const int turn = distance & (kWindowLength - 1);
-        return static_cast<std::size_t>(std::min(turn, kWindowLength - turn));
-    };
-    // Whether sidelobes of this response, log2, explain `peak` beside `target`.
-    const auto explains = [&](const Cell& target, const Cell& peak, std::int32_t response) {
-        return peak.power < target.power + std::max(response + margin, -dynamic_range);
-    };
-    const auto is_sidelobe = [&](const Cell& peak, const Cell& target) {
-        const std::int32_t range = range_response.sidelobe[fold(target.range - peak.range)];
-        // A real signal's other half: the spectrum at -range, -Doppler.
-        const std::int32_t range_mirrored = range_response.sidelobe[fold(target.range + peak.range)];
-        // What is too weak at the same Doppler shift is weaker at any other: nearly all pairs end here.
-        if (!explains(target, peak, std::max(range, range_mirrored))) return false;
-        return explains(
-            target, peak,
-            std::max(range + doppler_response.sidelobe[fold(target.doppler - peak.doppler)],
-                     range_mirrored + doppler_response.sidelobe[fold(target.doppler + peak.doppler)]));
-    };
+    const Sidelobes sidelobes(range_response, doppler_response, config);
     const Real model_error = Real::ratio(config.model_error_mcell, 1000);
     const Real model_variance = model_error * model_error;
     const Real range_cell2 = scale.range_cell_m * scale.range_cell_m;
     const Real rate_cell2 = scale.rate_cell_mps * scale.rate_cell_mps;
     const Real coupling2 = scale.coupling_s * scale.coupling_s;
-    // Candidates are no neighbours, so a sidelobe is at most this (the mirrored spectrum begins at cell 2).
-    const std::int32_t strongest_sidelobe =
-        std::max(std::max<std::int32_t>(range_response.sidelobe[2], doppler_response.sidelobe[2]) + margin,
-                 -dynamic_range);
-
     detections.count = 0;
     detections.dropped = 0;
     CandidateList list;
@@ -309,14 +417,7 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
     int targets = 0;  // the candidates that are no sidelobes move to the front of the list
     for (int c = 0; c < candidates; ++c) {
         const Cell peak = unpack(list[static_cast<std::size_t>(c)]);
-        bool sidelobe = false;
-        for (int t = 0; t < targets && !sidelobe; ++t) {
-            const Cell target = unpack(list[static_cast<std::size_t>(t)]);
-            // The rest is weaker still.
-            if (peak.power >= target.power + strongest_sidelobe && peak.range >= 2) break;
-            sidelobe = is_sidelobe(peak, target);
-        }
-        if (sidelobe) continue;
+        if (sidelobes.explain(peak, {list.data(), static_cast<std::size_t>(targets)})) continue;
         list[static_cast<std::size_t>(targets++)] = pack(peak);
 
         const std::int32_t snr = peak.power - cfar.noise(map, peak.range, peak.doppler);

@@ -20,15 +20,28 @@ constexpr std::int32_t saturate32(std::int64_t v) {
     return static_cast<std::int32_t>(v > kMax ? kMax : (v < kMin ? kMin : v));
 }
 
-/// Clamps to the range of int16. Exact inside it.
-constexpr std::int16_t saturate16(std::int32_t v) {
-    constexpr std::int32_t kMax = std::numeric_limits<std::int16_t>::max();
-    constexpr std::int32_t kMin = std::numeric_limits<std::int16_t>::min();
-    return static_cast<std::int16_t>(v > kMax ? kMax : (v < kMin ? kMin : v));
-}
-
 // On the targets one instruction each, with the same bits as the plain C++ beside it; every scenario replayed
 // on a board against the PC compares them.
+
+/// v / 2^Down, rounded down, clamped to the range of int16; 0 <= Down <= 31.
+template <int Down = 0>
+constexpr std::int32_t saturate16(std::int32_t v) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        std::int32_t out = 0;
+        if constexpr (Down == 0) {  // the compiler's __ssat changes signs on the way
+            asm("ssat %0, #16, %1" : "=r"(out) : "r"(v));
+        } else {
+            asm("ssat %0, #16, %1, asr %2" : "=r"(out) : "r"(v), "I"(Down));
+        }
+        return out;
+    }
+#endif
+    constexpr std::int32_t kMax = std::numeric_limits<std::int16_t>::max();
+    constexpr std::int32_t kMin = std::numeric_limits<std::int16_t>::min();
+    v >>= Down;
+    return v > kMax ? kMax : (v < kMin ? kMin : v);
+}
 
 /// a b. The compiler, left alone, remembers where a number comes from and multiplies it as one of 64 bits.
 constexpr std::int64_t product(std::int32_t a, std::int32_t b) {

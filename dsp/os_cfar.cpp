@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
-#include <type_traits>
+#include <span>
+#include <utility>
 
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
+#include "dsp/unrolled.hpp"
 
 namespace dsp {
 
@@ -50,137 +52,95 @@ std::int32_t os_cfar_noise_offset(int cells, int rank) {
 namespace {
 
 constexpr std::size_t kDopplerMask = kDopplerCells - 1;
+constexpr int kHalf = kDopplerCells / 2;
+using MapRow = std::array<std::uint16_t, kDopplerCells>;
 
-/// Calls `visit(log_power)` for the reference cells along Doppler.
+/// Calls `visit(right, left)` with the log-powers of the reference cells along Doppler, nearest first.
 template <class Visit>
 void for_each_doppler_reference(const PowerMap& map, const CfarConfig& config, int r, int d, Visit visit) {
     const std::uint16_t* row = map.cell[static_cast<std::size_t>(r)].data();
-    const int first = config.doppler_guard + 1;
-    const int reach = config.doppler_guard + config.spacing * config.doppler_reference;
-    const auto inside = [&]<int kSpacing>(std::integral_constant<int, kSpacing>) {
-        const std::uint16_t* right = row + d + first;
-        const std::uint16_t* left = row + d - first;
-        for (int i = config.doppler_reference; i > 0; --i) {
-            visit(*right);
-            visit(*left);
-            right += kSpacing;
-            left -= kSpacing;
-        }
-    };
-    if (d < reach || d + reach >= kDopplerCells) {
-        auto right = static_cast<std::size_t>(d + first);
-        auto left = static_cast<std::size_t>(d - first);
-        const auto step = static_cast<std::size_t>(config.spacing);
-        for (int i = config.doppler_reference; i > 0; --i) {
-            visit(row[right & kDopplerMask]);
-            visit(row[left & kDopplerMask]);
-            right += step;
-            left -= step;
-        }
-    } else if (config.spacing == 2) {
-        inside(std::integral_constant<int, 2>{});
-    } else {
-        inside(std::integral_constant<int, 1>{});
+    auto right = static_cast<std::size_t>(d + config.doppler_guard + 1);
+    auto left = static_cast<std::size_t>(d - config.doppler_guard - 1);
+    const auto step = static_cast<std::size_t>(config.spacing);
+    for (int i = config.doppler_reference; i > 0; --i) {
+        visit(row[right & kDopplerMask], row[left & kDopplerMask]);
+        right += step;
+        left -= step;
     }
 }
 
-/// And along range, in order of distance, both sides in turn; a side that has ended leaves its share to the
-/// other, so N is the same everywhere.
+/// Calls `visit(cell)` with the addresses of those along range, in order of distance, both sides in turn; a
+/// side that has ended leaves its share to the other, so N is the same everywhere.
 template <class Visit>
 void for_each_range_reference(const PowerMap& map, const CfarConfig& config, int r, int d, Visit visit) {
+    const std::uint16_t* cell = map.cell[static_cast<std::size_t>(r)].data() + d;
     int remaining = 2 * config.range_reference;
-    const int reach = config.range_guard + config.spacing * config.range_reference;
-    if (r - reach >= config.first_range_cell && r + reach < kRangeCells) {
-        const std::uint16_t* row = map.cell[static_cast<std::size_t>(r)].data() + d;
-        const std::ptrdiff_t step = std::ptrdiff_t{kDopplerCells} * config.spacing;
-        const std::uint16_t* above = row + std::ptrdiff_t{kDopplerCells} * (config.range_guard + 1);
-        const std::uint16_t* below = row - std::ptrdiff_t{kDopplerCells} * (config.range_guard + 1);
-        for (int i = config.range_reference; i > 0; --i) {
-            visit(*above);
-            visit(*below);
-            above += step;
-            below -= step;
-        }
-        return;
-    }
     for (int distance = config.range_guard + 1; remaining > 0; distance += config.spacing) {
+        const std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * distance;
         if (r + distance < kRangeCells) {
             --remaining;
-            visit(map.at(r + distance, d));
+            visit(cell + rows);
         }
         if (remaining > 0 && r - distance >= config.first_range_cell) {
             --remaining;
-            visit(map.at(r - distance, d));
+            visit(cell - rows);
         }
     }
 }
 
-/// One bit a cell of a row: those with even and with odd Doppler index, cells 2i and 2i+1 at bit 31-i. So a
-/// word of packed compares shifts in at the low end, and a count of leading zeros finds the cell.
-struct RowBits {
-    std::uint32_t even = 0;
-    std::uint32_t odd = 0;
-};
+/// One bit a cell of a row: those with even Doppler index, then those with odd, cells 2i and 2i+1 at bit
+/// 31-i. So compares shift in at the low end, and a count of leading zeros finds the cell.
+using RowBits = std::array<std::uint32_t, 2>;
+
+/// Joins the bits of the two halves of a row; the even cells of a half are in the low lane.
+constexpr RowBits join(packed::Pair first, packed::Pair second) {
+    return {first << 16 | (second & 0xFFFFU), (first & 0xFFFF'0000U) | second >> 16};
+}
 
 struct RowCompares {
-    RowBits rises;   ///< not below the cell to its left, cyclic; cell 0: above it
     RowBits filled;  ///< at least `level`
     RowBits high;    ///< at least `top`
 };
 
-/// The cell before the row in memory is read too, and does not matter.
-RowCompares compare_row(const std::uint16_t* row, std::uint16_t level, std::uint16_t top) {
-    const packed::Pair levels = packed::both(level);
-    const packed::Pair tops = packed::both(top);
-    std::array<packed::Pair, 2> rises{};  // of each half of the row: even cells in the high lane
+/// By the upper bytes of the cells, four of them in a word: `level` and `top` are upper bytes too.
+RowCompares compare_row(const MapRow& row, std::uint32_t level, std::uint32_t top) {
+    const std::uint32_t levels = level * 0x01010101U;
+    const std::uint32_t tops = top * 0x01010101U;
     std::array<packed::Pair, 2> filled{};
     std::array<packed::Pair, 2> high{};
     for (std::size_t half = 0; half < 2; ++half) {
-        packed::Pair rise = 0;
-        packed::Pair fill = 0;
-        packed::Pair over = 0;
-        const std::uint16_t* cell = row + half * kDopplerCells / 2;
-        const auto next = [&](const std::uint16_t* at) {
-            const packed::Pair now = packed::load(at);
-            rise = rise << 1 | packed::at_least(now, packed::load(at - 1));
-            fill = fill << 1 | packed::at_least(now, levels);
-            over = over << 1 | packed::at_least(now, tops);
+        std::uint32_t fill = 0;
+        std::uint32_t over = 0;
+        const auto next = [&](packed::Pair left_quarter, packed::Pair right_quarter) {
+            const std::uint32_t bytes = packed::high_bytes(left_quarter, right_quarter);
+            fill = fill << 1 | packed::bytes_at_least(bytes, levels);
+            over = over << 1 | packed::bytes_at_least(bytes, tops);
         };
-        for (int i = 0; i < kDopplerCells / 2; i += 8) {
-            next(cell + i);
-            next(cell + i + 2);
-            next(cell + i + 4);
-            next(cell + i + 6);
-        }
-        rises[half] = rise;
+        const std::uint16_t* cell = row.data() + half * kHalf;
+        unrolled<kHalf / 2, 4, 4>([&](std::size_t i) {
+            packed::Pair a = 0;
+            packed::Pair b = 0;
+            packed::Pair c = 0;
+            packed::Pair d = 0;
+            packed::load_pair(cell + i, a, b);
+            packed::load_pair(cell + i + kHalf / 2, c, d);
+            next(a, c);
+            next(b, d);
+        });
         filled[half] = fill;
         high[half] = over;
     }
-    const auto join = [](const std::array<packed::Pair, 2>& halves) {
-        return RowBits{halves[0] << 16 | (halves[1] & 0xFFFFU), (halves[0] & 0xFFFF'0000U) | halves[1] >> 16};
-    };
-    RowCompares result{join(rises), join(filled), join(high)};
-    constexpr std::uint32_t kCell0 = std::uint32_t{1} << 31;
-    result.rises.even =
-        row[0] > row[kDopplerCells - 1] ? result.rises.even | kCell0 : result.rises.even & ~kCell0;
-    return result;
+    return {join(filled[0], filled[1]), join(high[0], high[1])};
 }
 
-std::array<std::uint16_t, 2 + kDopplerCells> copy_with_a_cell_before(
-    const std::array<std::uint16_t, kDopplerCells>& row) {
-    std::array<std::uint16_t, 2 + kDopplerCells> copy{};
-    std::ranges::copy(row, copy.begin() + 2);
-    return copy;
+constexpr std::uint32_t majority(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    return (a & b) | ((a ^ b) & c);
 }
 
-/// For every bit: whether at least `least` of 16 bits are set, those at `right`..`right`+7 places after it
-/// and at `left`..`left`+7 before it, cyclic. Counted for all 32 at once: word j holds binary digit j of
-/// every count. `complement`: the binary digits of 32 - least, each as all ones or zero.
-using Digits = std::array<std::uint32_t, 5>;
-std::uint32_t many_set(std::uint32_t bits, int right, int left, const Digits& complement) {
-    const auto carry = [](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-        return (a & b) | ((a ^ b) & c);
-    };
+/// For every bit: whether more than 7 - `more` of 16 bits are set, those at `right`..`right`+7 places after
+/// it and at `left`..`left`+7 before it, cyclic; `more` 0..7. Counted for all 32 at once: word j holds binary
+/// digit j of every count.
+std::uint32_t many_set(std::uint32_t bits, int right, int left, std::uint32_t more) {
     // Two, four, then eight neighbours, this one first.
     const std::uint32_t next = std::rotl(bits, 1);
     const std::uint32_t p0 = bits ^ next;
@@ -189,47 +149,136 @@ std::uint32_t many_set(std::uint32_t bits, int right, int left, const Digits& co
     const std::uint32_t a1 = std::rotl(p1, 2);
     const std::uint32_t q0 = p0 ^ a0;
     const std::uint32_t q1 = p1 ^ a1 ^ (p0 & a0);
-    const std::uint32_t q2 = carry(p1, a1, p0 & a0);
+    const std::uint32_t q2 = majority(p1, a1, p0 & a0);
     const std::uint32_t b0 = std::rotl(q0, 4);
     const std::uint32_t b1 = std::rotl(q1, 4);
     const std::uint32_t b2 = std::rotl(q2, 4);
     const std::uint32_t c1 = q0 & b0;
-    const std::uint32_t c2 = carry(q1, b1, c1);
-    const std::array<std::uint32_t, 4> eight{q0 ^ b0, q1 ^ b1 ^ c1, q2 ^ b2 ^ c2, carry(q2, b2, c2)};
-    // Eight on the right plus eight on the left, plus 32 - least: the last carry is the answer.
+    const std::uint32_t c2 = majority(q1, b1, c1);
+    const std::uint32_t s0 = q0 ^ b0;
+    const std::uint32_t s1 = q1 ^ b1 ^ c1;
+    const std::uint32_t s2 = q2 ^ b2 ^ c2;
+    const std::uint32_t s3 = majority(q2, b2, c2);
     const int apart = right + left + 7;
-    std::uint32_t sum_carry = 0;
-    std::uint32_t answer = 0;
-    for (std::size_t j = 0; j < 4; ++j) {
-        const std::uint32_t other = std::rotr(eight[j], apart);
-        const std::uint32_t either = eight[j] ^ other;
-        answer = carry(either ^ sum_carry, complement[j], answer);
-        sum_carry = (eight[j] & other) | (either & sum_carry);
+    std::uint32_t l0 = std::rotr(s0, apart);
+    std::uint32_t l1 = std::rotr(s1, apart);
+    std::uint32_t l2 = std::rotr(s2, apart);
+    std::uint32_t l3 = std::rotr(s3, apart);
+    if (more != 0) {  // added to the left
+        const std::uint32_t m0 = 0U - (more & 1U);
+        const std::uint32_t m1 = 0U - (more >> 1 & 1U);
+        const std::uint32_t m2 = 0U - (more >> 2 & 1U);
+        const std::uint32_t d1 = l0 & m0;
+        const std::uint32_t d2 = majority(l1, m1, d1);
+        l3 |= majority(l2, m2, d2);
+        l2 ^= m2 ^ d2;
+        l1 ^= m1 ^ d1;
+        l0 ^= m0;
     }
-    return std::rotl(carry(sum_carry, complement[4], answer), right);
+    // More than seven: a digit of eight, or a carry into it.
+    return std::rotl(s3 | l3 | majority(s2, l2, majority(s1, l1, s0 & l0)), right);
 }
 
-/// The cells of a row that `level` alone rules out: so many of their reference cells are at least `level`
-/// that nothing up to `level` over the threshold is detected. Looks at eight cells along Doppler on each
-/// side, every second one.
+/// The cells of a row that `level` alone does not rule out. So many reference cells of the others are at
+/// least `level` that nothing up to `level` over the threshold is detected. Looks at eight cells along
+/// Doppler on each side, every second one.
 ///
 /// `first`: distance of the first reference cell. Of a cell's neighbours at an odd distance the index is of
-/// the other kind, even or odd.
-RowBits ruled_out(const RowBits& filled, int first, const Digits& complement) {
+/// the other kind, even or odd. `more`: see many_set().
+RowBits not_ruled_out(const RowBits& filled, int first, std::uint32_t more) {
     if (first % 2 == 0) {
-        return {many_set(filled.even, first / 2, first / 2, complement),
-                many_set(filled.odd, first / 2, first / 2, complement)};
+        return {many_set(~filled[0], first / 2, first / 2, more),
+                many_set(~filled[1], first / 2, first / 2, more)};
     }
-    return {many_set(filled.odd, first / 2, first / 2 + 1, complement),
-            many_set(filled.even, first / 2 + 1, first / 2, complement)};
+    return {many_set(~filled[1], first / 2, first / 2 + 1, more),
+            many_set(~filled[0], first / 2 + 1, first / 2, more)};
 }
 
-/// Larger than its neighbours in the rows above and below. Of equals the one later in memory is larger.
-bool tops_its_column(const PowerMap& map, int r, int d) {
-    const std::uint16_t x = map.at(r, d);
-    if (r > 0 && (map.at(r - 1, d) > x || map.at(r - 1, d - 1) > x || map.at(r - 1, d + 1) > x)) return false;
-    return r + 1 >= kRangeCells ||
-           (map.at(r + 1, d) < x && map.at(r + 1, d - 1) < x && map.at(r + 1, d + 1) < x);
+/// The neighbours of a row's cells. Of equals the one later in memory is larger.
+class Neighbours {
+  public:
+    /// A row that is missing is replaced by the one on the other side, which demands no less.
+    Neighbours(const PowerMap& map, int r)
+        : row_(map.cell[static_cast<std::size_t>(r)]),
+          lower_(map.cell[static_cast<std::size_t>(r > 0 ? r - 1 : r + 1)]),
+          upper_(map.cell[static_cast<std::size_t>(r + 1 < kRangeCells ? r + 1 : r - 1)]),
+          least_(r + 1 < kRangeCells ? 1 : 0) {}
+    [[nodiscard]] bool tops_its_row(int d) const {
+        const std::uint16_t x = row_[static_cast<std::size_t>(d)];
+        const std::uint16_t left = row_[left_of(d)];
+        const std::uint16_t right = row_[right_of(d)];
+        return x >= left && x >= right && (x > right || d == kDopplerCells - 1) && (x > left || d != 0);
+    }
+    [[nodiscard]] bool tops_its_columns(int d) const {
+        const auto middle = static_cast<std::size_t>(d);
+        const std::size_t left = left_of(d);
+        const std::size_t right = right_of(d);
+        const std::int32_t lower = row_[middle];
+        const std::int32_t upper = lower - least_;
+        return lower >= lower_[middle] && upper >= upper_[middle] && lower >= lower_[left] &&
+               lower >= lower_[right] && upper >= upper_[left] && upper >= upper_[right];
+    }
+
+  private:
+    static std::size_t left_of(int d) { return static_cast<std::size_t>(d - 1) & kDopplerMask; }
+    static std::size_t right_of(int d) { return static_cast<std::size_t>(d + 1) & kDopplerMask; }
+    const MapRow& row_;
+    const MapRow& lower_;
+    const MapRow& upper_;
+    std::int32_t least_;  ///< over those in the upper row
+};
+
+/// A row of the map, even and odd cells apart and repeated to both sides: cell d for -32 <= d < 96 at index
+/// d/2 + 16, so that cells d and d + 2 are a pair.
+class ParityRow {
+  public:
+    explicit ParityRow(const MapRow& row) {
+        const auto split = [&row, this](std::size_t i, std::size_t at, std::size_t again) {
+            packed::Pair a = 0;
+            packed::Pair b = 0;
+            packed::load_pair(row.data() + 2 * i, a, b);
+            const auto lane = [](packed::Pair x) { return static_cast<std::int32_t>(x); };
+            const packed::Pair evens = packed::pack_low(lane(a), lane(b));
+            const packed::Pair odds = packed::pack_high(lane(a), lane(b));
+            packed::store(&side_[0][at], evens);
+            packed::store(&side_[0][again], evens);
+            packed::store(&side_[1][at], odds);
+            packed::store(&side_[1][again], odds);
+        };
+        constexpr std::size_t kQuarter = kHalf / 2;
+        for (std::size_t i = 0; i < kQuarter; i += 2) split(i, kQuarter + i, 3 * kQuarter + i);
+        for (std::size_t i = kQuarter; i < kHalf; i += 2) split(i, kQuarter + i, i - kQuarter);
+    }
+    /// Cells d and d + 2.
+    [[nodiscard]] const std::uint16_t* pair(int d) const {
+        return side_[static_cast<std::size_t>(d & 1)].data() + (kHalf / 2 + (d >> 1));
+    }
+
+  private:
+    alignas(4) std::array<std::array<std::uint16_t, std::size_t{2} * kHalf>, 2> side_;
+};
+
+/// The cells that are larger than their neighbours in the row.
+RowBits maxima(const MapRow& row) {
+    packed::Pair before = packed::load(&row[kDopplerCells - 2]);
+    std::array<packed::Pair, 2> bits{};
+    for (std::size_t half = 0; half < 2; ++half) {
+        packed::Pair rise = 0;
+        unrolled<kHalf, 4, 4>([&](std::size_t i) {
+            packed::Pair a = 0;
+            packed::Pair b = 0;
+            packed::load_pair(row.data() + half * kHalf + i, a, b);
+            rise = rise << 1 | packed::at_least(a, before >> 16 | a << 16);
+            rise = rise << 1 | packed::at_least(b, a >> 16 | b << 16);
+            before = b;
+        });
+        bits[half] = rise;
+    }
+    // Not below the one to their left; cell 0: above it.
+    RowBits rises = join(bits[0], bits[1]);
+    if (row[0] == row[kDopplerCells - 1]) rises[0] &= ~(std::uint32_t{1} << 31);
+    // And the next one does not rise.
+    return {rises[0] & ~rises[1], rises[1] & ~std::rotl(rises[0], 1)};
 }
 
 }  // namespace
@@ -250,78 +299,238 @@ bool OsCfar::detects(const PowerMap& map, int range_cell, int doppler_cell) cons
     const auto count = [limit, &below](std::int32_t reference) {
         below += static_cast<std::int32_t>(static_cast<std::uint32_t>(reference - limit) >> 31);
     };
-    for_each_doppler_reference(map, config_, range_cell, doppler_cell, count);
+    for_each_doppler_reference(map, config_, range_cell, doppler_cell,
+                               [&count](std::uint16_t right, std::uint16_t left) {
+                                   count(right);
+                                   count(left);
+                               });
     if (below + 2 * config_.range_reference < config_.rank) return false;
-    for_each_range_reference(map, config_, range_cell, doppler_cell, count);
+    for_each_range_reference(map, config_, range_cell, doppler_cell,
+                             [&count](const std::uint16_t* cell) { count(*cell); });
     return below >= config_.rank;
 }
 
-std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell) const {
-    std::array<std::uint16_t, kMaxReferenceCells> reference;
-    std::size_t count = 0;
-    const auto take = [&](std::uint16_t x) { reference[count++] = x; };
-    for_each_doppler_reference(map, config_, range_cell, doppler_cell, take);
-    for_each_range_reference(map, config_, range_cell, doppler_cell, take);
-    // Hoare's selection: parts the cells about a pivot until the pivot's place is the one asked for.
-    const auto wanted = static_cast<std::ptrdiff_t>(config_.rank - 1);
-    std::ptrdiff_t low = 0;
-    std::ptrdiff_t high = static_cast<std::ptrdiff_t>(count) - 1;
-    const auto at = [&reference](std::ptrdiff_t i) -> std::uint16_t& {
-        return reference[static_cast<std::size_t>(i)];
-    };
-    while (low < high) {
-        const std::uint16_t pivot = at(wanted);
-        std::ptrdiff_t i = low;
-        std::ptrdiff_t j = high;
-        while (i <= j) {
-            while (at(i) < pivot) ++i;
-            while (at(j) > pivot) --j;
-            if (i <= j) std::swap(at(i++), at(j--));
+namespace {
+
+constexpr int kPairsSorted = 10;  ///< of reference cells, as many as the default configuration has
+
+struct Exchange {
+    std::size_t low;
+    std::size_t high;
+};
+
+/// Calls `visit(exchange)` for Batcher's merge exchange (1968) of kPairsSorted numbers.
+template <class Visit>
+constexpr void for_each_exchange(Visit visit) {
+    constexpr std::size_t kSize = kPairsSorted;
+    constexpr std::size_t kTop = std::bit_ceil(kSize) / 2;
+    for (std::size_t p = kTop; p > 0; p /= 2) {
+        std::size_t remainder = 0;
+        std::size_t distance = p;
+        for (std::size_t q = kTop;; q /= 2) {
+            for (std::size_t i = 0; i + distance < kSize; ++i) {
+                if ((i & p) == remainder) visit(Exchange{i, i + distance});
+            }
+            if (q == p) break;
+            distance = q - p;
+            remainder = p;
         }
-        if (j < wanted) low = i;
-        if (wanted < i) high = j;
     }
-    return std::max<std::int32_t>(at(wanted) + noise_offset_, 0);
 }
 
-void os_cfar(const PowerMap& map, const OsCfar& cfar, const CellMask& candidates, CellMask& hits) {
-    hits = CellMask{};
-    for (int r = cfar.config().first_range_cell; r < kRangeCells; ++r) {
-        for (std::uint64_t rest = candidates.row[static_cast<std::size_t>(r)]; rest != 0; rest &= rest - 1) {
-            const int d = std::countr_zero(rest);
-            if (cfar.detects(map, r, d)) hits.set(r, d);
+constexpr std::size_t kExchanges = [] {
+    std::size_t count = 0;
+    for_each_exchange([&count](Exchange) { ++count; });
+    return count;
+}();
+
+constexpr auto kNetwork = [] {
+    std::array<Exchange, kExchanges> network{};
+    std::size_t count = 0;
+    for_each_exchange([&](Exchange exchange) { network[count++] = exchange; });
+    return network;
+}();
+
+/// The rank-th smallest of twice kPairsSorted numbers: sorts every other one and the rest at once, in two
+/// lanes, and merges.
+std::uint16_t select_by_sorting(const std::uint16_t* numbers, int rank) {
+    std::array<packed::Pair, kPairsSorted> lanes{};
+    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { lanes[i] = packed::load(numbers + 2 * i); });
+    [&lanes]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
+        (packed::order(lanes[kNetwork[kIndex].low], lanes[kNetwork[kIndex].high]), ...);
+    }
+    (std::make_index_sequence<kExchanges>{});
+    // Of i smallest of one lane and rank - i of the other the larger: the right i gives the least.
+    std::array<packed::Pair, 1 + kPairsSorted> sorted;
+    sorted[0] = 0;
+    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { sorted[1 + i] = lanes[i]; });
+    packed::Pair least = packed::both(0xFFFF);
+    int j = std::min(rank, kPairsSorted);
+    for (int i = rank - j; i <= j; ++i, --j) {
+        packed::Pair low = sorted[static_cast<std::size_t>(i)];
+        packed::Pair high = packed::swap(sorted[static_cast<std::size_t>(j)]);
+        packed::order(low, high);
+        packed::order(least, high);
+    }
+    return static_cast<std::uint16_t>(std::min(least & 0xFFFFU, least >> 16));
+}
+
+/// The same of any even number of them: the largest one that is above fewer than `rank`, bit by bit.
+std::uint16_t select_by_counting(std::span<const std::uint16_t> numbers, int rank) {
+    const auto most = numbers.size() - static_cast<std::size_t>(rank);
+    std::uint32_t selected = 0;
+    for (std::uint32_t bit = 0x8000; bit != 0; bit /= 2) {
+        packed::Pair not_below = 0;
+        const packed::Pair tried = packed::both(static_cast<std::uint16_t>(selected | bit));
+        for (std::size_t i = 0; i < numbers.size(); i += 2) {
+            not_below += packed::at_least(packed::load(&numbers[i]), tried);
+        }
+        if ((not_below & 0xFFFFU) + (not_below >> 16) > most) selected |= bit;
+    }
+    return static_cast<std::uint16_t>(selected);
+}
+
+}  // namespace
+
+std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell) const {
+    alignas(4) std::array<std::uint16_t, kMaxReferenceCells> cells;
+    std::uint16_t* end = cells.data();
+    for_each_doppler_reference(map, config_, range_cell, doppler_cell,
+                               [&end](std::uint16_t right, std::uint16_t left) {
+                                   packed::store(end, packed::pack_low(right, left));
+                                   end += 2;
+                               });
+    for_each_range_reference(map, config_, range_cell, doppler_cell,
+                             [&end](const std::uint16_t* cell) { *end++ = *cell; });
+    std::int32_t selected = 0;
+    if (end - cells.data() <= 2 * kPairsSorted) {
+        std::fill(end, cells.data() + 2 * kPairsSorted, std::uint16_t{0xFFFF});
+        selected = select_by_sorting(cells.data(), config_.rank);
+    } else {
+        selected = select_by_counting({cells.data(), end}, config_.rank);
+    }
+    return std::max<std::int32_t>(selected + noise_offset_, 0);
+}
+
+namespace {
+
+/// Takes the first cell out of one half of a RowBits. Returns its index within the half.
+int take_first(std::uint32_t& bits) {
+    const int i = std::countl_zero(bits);
+    bits &= ~(std::uint32_t{0x8000'0000} >> i);
+    return i;
+}
+
+/// Whether at most kMost bits are set.
+template <std::size_t kMost>
+bool few(std::uint32_t bits) {
+    unrolled<kMost, 1, kMost>([&bits](std::size_t) { bits &= bits - 1; });
+    return bits == 0;
+}
+
+/// Those of `candidates`, no two of them neighbours, that are over threshold, as CellMask::row: two at once,
+/// those at d and d + 2, with their reference cells two in a word. For a spacing of 2, kUnrolled or more
+/// reference cells on each side along Doppler, and a threshold of 0..65535.
+constexpr int kUnrolled = 8;
+[[gnu::noinline]] std::uint64_t detected_in_pairs(const PowerMap& map, const OsCfar& cfar, int r,
+                                                  const RowBits& candidates) {
+    const CfarConfig& config = cfar.config();
+    const MapRow& row = map.cell[static_cast<std::size_t>(r)];
+    const ParityRow parity(row);
+    std::array<const std::uint16_t*, std::size_t{2} * kMaxRangeReference> range_reference;
+    const std::uint16_t** range_end = range_reference.data();
+    for_each_range_reference(map, config, r, 0,
+                             [&range_end](const std::uint16_t* cell) { *range_end++ = cell; });
+    const packed::Pair thresholds = packed::both(static_cast<std::uint16_t>(cfar.threshold()));
+    const auto not_below = static_cast<std::uint16_t>(config.reference_cells() - config.rank);
+    const int first = config.doppler_guard + 1;
+    std::uint64_t detected = 0;
+    for (int odd = 0; odd < 2; ++odd) {
+        const std::uint16_t* pairs = parity.pair(odd);
+        const std::uint16_t* rightmost = parity.pair(odd + first);
+        const std::uint16_t* leftmost = parity.pair(odd - first);
+        for (std::uint32_t rest = candidates[static_cast<std::size_t>(odd)]; rest != 0;) {
+            const int i = take_first(rest);
+            const std::uint32_t next = std::uint32_t{0x4000'0000} >> i;
+            const packed::Pair wanted = (rest & next) == 0 ? packed::pack(1, 0) : packed::both(1);
+            rest &= ~next;
+            // Nothing is below a limit of zero.
+            const packed::Pair limits = packed::minus_to_zero(packed::load(pairs + i), thresholds);
+            packed::Pair above = 0;
+            const auto count = [&above, limits](packed::Pair references) {
+                above += packed::at_least(references, limits);
+            };
+            const std::uint16_t* right = rightmost + i;
+            const std::uint16_t* left = leftmost + i;
+            unrolled<kUnrolled, 1, kUnrolled>([&](std::size_t k) {
+                count(packed::load(right + k));
+                count(packed::load(left - k));
+            });
+            for (int k = kUnrolled; k < config.doppler_reference; ++k) {
+                count(packed::load(right + k));
+                count(packed::load(left - k));
+            }
+            const int d = 2 * i + odd;
+            const int second = (d + 2) & static_cast<int>(kDopplerMask);
+            for (const std::uint16_t** reference = range_reference.data(); reference != range_end;) {
+                const std::uint16_t* cell = *reference++;
+                count(packed::pack_low(cell[d], cell[second]));
+            }
+            const packed::Pair found = packed::where_at_least(packed::both(not_below), above, wanted);
+            detected |= std::uint64_t{(found & 1U) | (found >> 16 << 2)} << d;
         }
     }
+    return detected;
 }
+
+}  // namespace
 
 void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, CellMask& peaks) {
     peaks = CellMask{};
     const CfarConfig& config = cfar.config();
     // What is at least `top` is tested whatever its neighbours say: its limit is above `level`.
-    const std::int32_t top = std::max<std::int32_t>(level + cfar.threshold() + 1, 0);
-    const auto top16 = static_cast<std::uint16_t>(std::min<std::int32_t>(top, 0xFFFF));
+    const std::uint32_t level8 = level >> 8;
+    const std::int32_t top = static_cast<std::int32_t>(level8 << 8) + cfar.threshold() + 1;
+    const auto top8 = static_cast<std::uint32_t>(std::clamp<std::int32_t>(top, 0, 0xFFFF)) >> 8;
     const int least = config.reference_cells() - config.rank + 1;
     const bool enough = (config.doppler_reference - 1) * config.spacing >= 14 && least <= 16;
-    Digits complement{};
-    for (std::size_t j = 0; j < complement.size(); ++j) {
-        complement[j] = 0U - ((32U - static_cast<std::uint32_t>(least)) >> j & 1U);
-    }
+    const auto more = static_cast<std::uint32_t>(std::max(least - 9, 0));
+    const bool in_pairs = config.spacing == 2 && config.doppler_reference >= kUnrolled &&
+                          cfar.threshold() >= 0 && cfar.threshold() <= 0xFFFF;
     for (int r = config.first_range_cell; r < kRangeCells; ++r) {
-        const RowCompares row =
-            r == 0 ? compare_row(copy_with_a_cell_before(map.cell[0]).data() + 2, level, top16)
-                   : compare_row(map.cell[static_cast<std::size_t>(r)].data(), level, top16);
-        const RowBits out = enough ? ruled_out(row.filled, config.doppler_guard + 1, complement) : RowBits{};
-        const auto test = [&](std::uint32_t rest, int odd) {
-            while (rest != 0) {
-                const int i = std::countl_zero(rest);
-                rest &= ~(std::uint32_t{0x8000'0000} >> i);
-                const int d = 2 * i + odd;
-                if (tops_its_column(map, r, d) && cfar.detects(map, r, d)) peaks.set(r, d);
+        const MapRow& row = map.cell[static_cast<std::size_t>(r)];
+        RowBits candidates{~std::uint32_t{0}, ~std::uint32_t{0}};
+        if (enough) {
+            const RowCompares compares = compare_row(row, level8, top8);
+            candidates = not_ruled_out(compares.filled, config.doppler_guard + 1, more);
+            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] |= compares.high[odd];
+        }
+        // A few are compared with their neighbours one by one, many by comparing the whole row.
+        const bool compared = !few<6>(candidates[0] | candidates[1]);
+        if (compared) {
+            const RowBits in_row = maxima(row);
+            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_row[odd];
+        }
+        const Neighbours neighbours(map, r);
+        for (std::size_t odd = 0; odd < 2; ++odd) {
+            for (std::uint32_t rest = candidates[odd]; rest != 0;) {
+                const int i = take_first(rest);
+                const int d = 2 * i + static_cast<int>(odd);
+                if ((!compared && !neighbours.tops_its_row(d)) || !neighbours.tops_its_columns(d)) {
+                    candidates[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
+                }
             }
-        };
-        // A maximum of its row rises from the left, and the next cell does not.
-        test(row.rises.even & ~row.rises.odd & (~out.even | row.high.even), 0);
-        test(row.rises.odd & ~std::rotl(row.rises.even, 1) & (~out.odd | row.high.odd), 1);
+        }
+        if (in_pairs && !few<3>(candidates[0] | candidates[1])) {
+            peaks.row[static_cast<std::size_t>(r)] = detected_in_pairs(map, cfar, r, candidates);
+            continue;
+        }
+        for (std::size_t odd = 0; odd < 2; ++odd) {
+            while (candidates[odd] != 0) {
+                const int d = 2 * take_first(candidates[odd]) + static_cast<int>(odd);
+                if (cfar.detects(map, r, d)) peaks.set(r, d);
+            }
+        }
     }
 }
 

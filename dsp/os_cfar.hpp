@@ -52,7 +52,8 @@ struct CfarConfig {
 };
 static_assert(CfarConfig{}.valid());
 
-inline constexpr int kMaxReferenceCells = 2 * (16 + 8);
+inline constexpr int kMaxRangeReference = 8;  ///< on each side
+inline constexpr int kMaxReferenceCells = 2 * (16 + kMaxRangeReference);
 
 /// log2 of the threshold factor alpha, Q6.10: the solution of prod_{i<k} (N-i)/(N-i+alpha) = Pfa for
 /// exponentially distributed power (square-law cells), by bisection in integers. Error below one step.
@@ -73,8 +74,7 @@ class OsCfar {
     [[nodiscard]] std::int32_t threshold() const { return threshold_; }
 
     /// x > alpha X_(k), exactly, without sorting: in logarithms x - log2 alpha > X_(k), which holds if and
-    /// only if at least k reference cells are smaller than x - log2 alpha. Stops at the N-k+1-th cell that is
-    /// not: two or three compares for a cell that is noise.
+    /// only if at least k reference cells are smaller than x - log2 alpha.
     [[nodiscard]] bool detects(const PowerMap& map, int range_cell, int doppler_cell) const;
 
     /// The k-th smallest reference cell scaled to the mean noise power, log2 Q6.10; not below 0.
@@ -85,10 +85,6 @@ class OsCfar {
     std::int32_t threshold_;
     std::int32_t noise_offset_;
 };
-
-/// Tests the cells in `candidates` and writes those over threshold to `hits`; rows below first_range_cell
-/// never hit.
-void os_cfar(const PowerMap& map, const OsCfar& cfar, const CellMask& candidates, CellMask& hits);
 
 /// The cells over threshold that are larger than their eight neighbours (Doppler cyclic): what os_cfar()
 /// finds among the local maxima, whatever `level` is. The row below first_range_cell is a neighbour too: the

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "dsp/fixed_point.hpp"
+
 #if defined(__ARM_FEATURE_SIMD32) && defined(__ARM_FEATURE_DSP)
 #include <arm_acle.h>
 #define DSP_PACKED_INTRINSICS 1
@@ -34,6 +36,25 @@ Pair load(const T* samples) {
     Pair pair;
     std::memcpy(&pair, samples, sizeof pair);
     return pair;
+}
+/// Four samples next to each other, at an address that is a multiple of four bytes: one instruction.
+template <class T>
+void load_pair(const T* samples, Pair& first, Pair& second) {
+#if DSP_PACKED_INTRINSICS
+    static_assert(sizeof(T) == 2);
+    using Word2 [[gnu::may_alias, gnu::aligned(4)]] = std::uint64_t;
+    asm("ldrd %0, %1, %2"
+        : "=r"(first), "=r"(second)
+        : "m"(*static_cast<const Word2*>(static_cast<const void*>(samples))));
+#else
+    first = load(samples);
+    second = load(samples + 2);
+#endif
+}
+template <class T>
+void store(T* samples, Pair pair) {
+    static_assert(sizeof(T) == 2);
+    std::memcpy(samples, &pair, sizeof pair);
 }
 constexpr Pair both(std::uint16_t a) {
     return a | std::uint32_t{a} << 16;
@@ -74,20 +95,17 @@ constexpr Pair half_add_j(Pair a, Pair b) {
 constexpr Pair half_sub_j(Pair a, Pair b) {
     return pack((lane0(a) + lane1(b)) >> 1, (lane1(a) - lane0(b)) >> 1);
 }
-constexpr std::int32_t clamp(std::int32_t v) {
-    return v > 32767 ? 32767 : (v < -32768 ? -32768 : v);
-}
 constexpr Pair saturated_add(Pair a, Pair b) {
-    return pack(clamp(lane0(a) + lane0(b)), clamp(lane1(a) + lane1(b)));
+    return pack(saturate16(lane0(a) + lane0(b)), saturate16(lane1(a) + lane1(b)));
 }
 constexpr Pair saturated_sub(Pair a, Pair b) {
-    return pack(clamp(lane0(a) - lane0(b)), clamp(lane1(a) - lane1(b)));
+    return pack(saturate16(lane0(a) - lane0(b)), saturate16(lane1(a) - lane1(b)));
 }
 constexpr Pair saturated_add_j(Pair a, Pair b) {
-    return pack(clamp(lane0(a) - lane1(b)), clamp(lane1(a) + lane0(b)));
+    return pack(saturate16(lane0(a) - lane1(b)), saturate16(lane1(a) + lane0(b)));
 }
 constexpr Pair saturated_sub_j(Pair a, Pair b) {
-    return pack(clamp(lane0(a) + lane1(b)), clamp(lane1(a) - lane0(b)));
+    return pack(saturate16(lane0(a) + lane1(b)), saturate16(lane1(a) - lane0(b)));
 }
 constexpr Pair largest(Pair a, Pair b) {
     return pack(lane0(a) > lane0(b) ? lane0(a) : lane0(b), lane1(a) > lane1(b) ? lane1(a) : lane1(b));
@@ -106,6 +124,27 @@ constexpr Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
 }
 constexpr Pair at_least(Pair a, Pair b) {
     return ((a & 0xFFFFU) >= (b & 0xFFFFU) ? 1U : 0U) | (a >> 16 >= b >> 16 ? 0x10000U : 0U);
+}
+constexpr Pair where_at_least(Pair a, Pair b, Pair value) {
+    return value & (0xFFFFU * at_least(a, b));
+}
+constexpr Pair minus_to_zero(Pair a, Pair b) {
+    return ((a & 0xFFFFU) > (b & 0xFFFFU) ? (a & 0xFFFFU) - (b & 0xFFFFU) : 0U) |
+           (a >> 16 > b >> 16 ? (a >> 16) - (b >> 16) : 0U) << 16;
+}
+constexpr void order(Pair& low, Pair& high) {
+    const Pair swapped = 0xFFFFU * at_least(low, high);
+    const Pair change = (low ^ high) & swapped;
+    low ^= change;
+    high ^= change;
+}
+constexpr std::uint32_t high_bytes(Pair a, Pair b) {
+    return (a & 0xFF00'FF00U) | (b >> 8 & 0x00FF'00FFU);
+}
+constexpr std::uint32_t bytes_at_least(std::uint32_t a, std::uint32_t b) {
+    std::uint32_t result = 0;
+    for (int i = 0; i < 32; i += 8) result |= ((a >> i & 0xFFU) >= (b >> i & 0xFFU) ? 1U : 0U) << i;
+    return result;
 }
 constexpr std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) + product(lane1(a), lane1(b)) + sum);
@@ -211,6 +250,33 @@ inline Pair at_least(Pair a, Pair b) {
     (void)__usub16(a, b);  // sets a flag for each byte that does not borrow
     return __sel(0x00010001U, 0U);
 }
+/// `value` in each lane where a >= b, both unsigned; else zero.
+inline Pair where_at_least(Pair a, Pair b, Pair value) {
+    (void)__usub16(a, b);
+    return __sel(value, 0U);
+}
+/// Lane by lane, of unsigned numbers, not below zero.
+inline Pair minus_to_zero(Pair a, Pair b) {
+    return __uqsub16(a, b);
+}
+/// Lane by lane, of unsigned numbers: the smaller to `low`, the larger to `high`.
+inline void order(Pair& low, Pair& high) {
+    (void)__usub16(low, high);
+    const Pair larger = __sel(low, high);
+    low = __sel(high, low);
+    high = larger;
+}
+/// The high bytes of four lanes: those of `a` in bytes 1 and 3, those of `b` in bytes 0 and 2.
+inline std::uint32_t high_bytes(Pair a, Pair b) {
+    std::uint32_t result;
+    asm("uxtab16 %0, %1, %2, ror #8" : "=r"(result) : "r"(a & 0xFF00'FF00U), "r"(b));
+    return result;
+}
+/// One in each byte where a >= b, both unsigned; else zero.
+inline std::uint32_t bytes_at_least(std::uint32_t a, std::uint32_t b) {
+    (void)__usub8(a, b);
+    return __sel(0x01010101U, 0U);
+}
 /// sum + a0 b0 + a1 b1
 inline std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
     return __smlad(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
@@ -242,12 +308,6 @@ inline std::int32_t scale_0(std::int32_t a, Pair b) {
 }
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
     return __smlawt(a, static_cast<std::int32_t>(b), 0);
-}
-/// Clamped to 16 bits.
-inline std::int32_t clamp(std::int32_t v) {
-    std::int32_t result;
-    asm("ssat %0, #16, %1" : "=r"(result) : "r"(v));  // the compiler's __ssat changes signs on the way
-    return result;
 }
 #else
 using namespace portable;

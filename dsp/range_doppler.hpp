@@ -28,7 +28,8 @@ struct Spectrum {
 /// cell loses precision to a stronger one in another row. Powers below one read 0; the largest possible is
 /// 54.0.
 struct PowerMap {
-    std::array<std::array<std::uint16_t, kDopplerCells>, kRangeCells> cell;  ///< Doppler cell 0: standstill
+    alignas(4) std::array<std::array<std::uint16_t, kDopplerCells>,
+                          kRangeCells> cell;  ///< Doppler cell 0: standstill
 
     /// Doppler cells repeat every kDopplerCells.
     [[nodiscard]] constexpr std::uint16_t at(int range, int doppler) const {

@@ -28,17 +28,21 @@ struct WindowResponse {
     /// Q12, for cells -2..2 around the peak, and a zero: in pairs, as packed products take them.
     using Weights = std::array<std::int16_t, kTaps + 1>;
 
-    alignas(4) std::array<Weights, kGrid> amplitude;  ///< a
-    alignas(4) std::array<Weights, kGrid> offset;     ///< g
-    /// Variance of A (of d times A^2) for noise of power one in each cell, Q12: a' C a and g' C g.
-    std::array<std::uint16_t, kGrid> amplitude_variance;
-    std::array<std::uint16_t, kGrid> offset_variance;
+    struct Lobe {
+        Weights amplitude;  ///< a
+        Weights offset;     ///< g
+    };
+    alignas(4) std::array<Lobe, kGrid> lobe;
+    /// log2 of the variance of A (of d times A^2) for noise of power 2^-12 in each cell, Q6.10: of a' C a and
+    /// g' C g.
+    std::array<std::int16_t, kGrid> amplitude_variance;
+    std::array<std::int16_t, kGrid> offset_variance;
     /// log2 of the power of a cell next to the peak cell (at distance one, the nearer side) over that of the
     /// peak, by guess -8/16 .. 8/16, Q6.10: places a target where only one neighbour exists.
     std::array<std::int16_t, kGridPerCell + 1> below;
     /// log2 of the largest power m cells away from the peak cell of a target, over that of the peak cell,
-    /// whatever its offset: Q6.10, never positive.
-    std::array<std::int16_t, kWindowLength / 2 + 1> sidelobe;
+    /// whatever its offset: Q6.10, never positive. The spectrum is cyclic: 63 is 1.
+    std::array<std::int16_t, kWindowLength> sidelobe;
 };
 
 namespace detail {
@@ -177,8 +181,8 @@ constexpr WindowResponse make_response(const Window& window) {
         for (std::size_t i = 0; i < kTaps; ++i) {
             a[i] = divide_q24(multiply_q24(f11, u[i]) - multiply_q24(f01, v[i]), det);
             g[i] = divide_q24(multiply_q24(f00, v[i]) - multiply_q24(f01, u[i]), det);
-            result.amplitude[grid][i] = static_cast<std::int16_t>(round_shift(a[i], kDown));
-            result.offset[grid][i] = static_cast<std::int16_t>(round_shift(g[i], kDown));
+            result.lobe[grid].amplitude[i] = static_cast<std::int16_t>(round_shift(a[i], kDown));
+            result.lobe[grid].offset[i] = static_cast<std::int16_t>(round_shift(g[i], kDown));
         }
         Vector ca{};
         Vector cg{};
@@ -186,8 +190,12 @@ constexpr WindowResponse make_response(const Window& window) {
             ca[i] = dot(covariance[i], a);
             cg[i] = dot(covariance[i], g);
         }
-        result.amplitude_variance[grid] = static_cast<std::uint16_t>(round_shift(dot(a, ca), kDown));
-        result.offset_variance[grid] = static_cast<std::uint16_t>(round_shift(dot(g, cg), kDown));
+        const auto log2 = [](std::int64_t variance) {
+            return static_cast<std::int16_t>(
+                log2_q10(static_cast<std::uint16_t>(round_shift(variance, kDown))));
+        };
+        result.amplitude_variance[grid] = log2(dot(a, ca));
+        result.offset_variance[grid] = log2(dot(g, cg));
     }
     for (int grid = 0; grid <= WindowResponse::kGridPerCell; ++grid) {
         const int d = grid - WindowResponse::kGridPerCell / 2;
@@ -201,7 +209,9 @@ constexpr WindowResponse make_response(const Window& window) {
                 model.log2_power(WindowResponse::kGridPerCell * m - d) - model.log2_power(d);
             largest = level > largest ? level : largest;
         }
-        result.sidelobe[static_cast<std::size_t>(m)] = static_cast<std::int16_t>(largest);
+        const auto distance = static_cast<std::size_t>(m);
+        result.sidelobe[distance] = static_cast<std::int16_t>(largest);
+        result.sidelobe[kWindowLength - distance] = static_cast<std::int16_t>(largest);
     }
     return result;
 }

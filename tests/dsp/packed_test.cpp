@@ -52,6 +52,25 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     lanes(std::max(a0, b0), std::max(a1, b1), largest(a, b));
     lanes(std::min(a0, b0), std::min(a1, b1), smallest(a, b));
     lanes(a1, a0, swap(a));
+    const int u0 = a0 & 0xFFFF;
+    const int u1 = a1 & 0xFFFF;
+    const int v0 = b0 & 0xFFFF;
+    const int v1 = b1 & 0xFFFF;
+    const auto where = [](bool here, int x) { return wrap16(here ? x : 0); };
+    lanes(where(u0 >= v0, 1), where(u1 >= v1, 1), at_least(a, b));
+    lanes(where(u0 >= v0, 7), where(u1 >= v1, -9), where_at_least(a, b, pack(7, -9)));
+    lanes(where(u0 > v0, u0 - v0), where(u1 > v1, u1 - v1), minus_to_zero(a, b));
+    Pair low = a;
+    Pair high = b;
+    order(low, high);
+    lanes(wrap16(std::min(u0, v0)), wrap16(std::min(u1, v1)), low);
+    lanes(wrap16(std::max(u0, v0)), wrap16(std::max(u1, v1)), high);
+    lanes(wrap16(v0 / 256 + u0 / 256 * 256), wrap16(v1 / 256 + u1 / 256 * 256),
+          static_cast<Pair>(high_bytes(a, b)));
+    const auto bytes = [](int x, int y) {
+        return (x / 256 >= y / 256 ? 256 : 0) + (x % 256 >= y % 256 ? 1 : 0);
+    };
+    lanes(bytes(u0, v0), bytes(u1, v1), static_cast<Pair>(bytes_at_least(a, b)));
     const auto product = [](std::int64_t x, std::int64_t y) { return x * y; };
     LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1) + sum), dot(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b0) - product(a1, b1) + sum), dot_minus(a, b, sum));
@@ -88,6 +107,18 @@ TEST(Packed, RandomNumbers) {
         check(draw(), draw(), draw(), draw(),
               static_cast<std::int32_t>(static_cast<std::uint32_t>(random())));
     }
+}
+
+TEST(Packed, SamplesGoToMemoryAndBack) {
+    alignas(4) const std::array<std::uint16_t, 4> samples{1, 2, 0xFFFE, 0xFFFF};
+    Pair first = 0;
+    Pair second = 0;
+    load_pair(samples.data(), first, second);
+    lanes(1, 2, first);
+    lanes(-2, -1, second);
+    std::array<std::uint16_t, 4> copy{};
+    store(&copy[1], second);
+    CHECK(copy == (std::array<std::uint16_t, 4>{0, 0xFFFE, 0xFFFF, 0}));
 }
 
 TEST(Packed, MagnitudeBitsCoverEveryValue) {

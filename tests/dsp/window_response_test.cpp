@@ -56,11 +56,12 @@ TEST(WindowResponse, WeightsAreTheLeastSquaresSolution) {
             const Eigen::Matrix<double, 2, 5> k = (h.transpose() * u).inverse() * u.transpose();
             for (int i = 0; i < 5; ++i) {
                 const auto tap = static_cast<std::size_t>(i);
-                DOUBLES_EQUAL(k(0, i), r.amplitude[grid][tap] / 4096.0, 3e-4);
-                DOUBLES_EQUAL(k(1, i), r.offset[grid][tap] / 4096.0, 3e-4);
+                DOUBLES_EQUAL(k(0, i), r.lobe[grid].amplitude[tap] / 4096.0, 3e-4);
+                DOUBLES_EQUAL(k(1, i), r.lobe[grid].offset[tap] / 4096.0, 3e-4);
             }
-            DOUBLES_EQUAL((k * c * k.transpose())(0, 0), r.amplitude_variance[grid] / 4096.0, 1e-3);
-            DOUBLES_EQUAL((k * c * k.transpose())(1, 1), r.offset_variance[grid] / 4096.0, 1e-3);
+            const Eigen::Matrix2d variance = k * c * k.transpose();
+            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(0, 0)), r.amplitude_variance[grid], 2);
+            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(1, 1)), r.offset_variance[grid], 2);
         }
     }
 }
@@ -71,6 +72,7 @@ TEST(WindowResponse, SidelobesAreAnUpperBoundAndATightOne) {
         const WindowResponse& r = dsp::kWindowResponses[kind];
         LONGS_EQUAL(0, r.sidelobe[0]);
         LONGS_EQUAL(0, r.sidelobe[1]);
+        for (std::size_t m = 1; m <= 32; ++m) LONGS_EQUAL(r.sidelobe[m], r.sidelobe[64 - m]);
         for (int m = 2; m <= 32; ++m) {
             double largest = -1000;
             for (int d = -50; d <= 50; ++d) {
