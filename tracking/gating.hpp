@@ -62,7 +62,7 @@ class Gate {
                           config.min_rate_sigma_mps * config.min_rate_sigma_mps),
           obscured_variance_(config.obscured_range_sigma_m * config.obscured_range_sigma_m,
                              config.obscured_rate_sigma_mps * config.obscured_rate_sigma_mps),
-          half_span_(config.rate_span_mps * constant<S>(1, 2)),
+          most_change_(config.rate_span_mps > S(0) ? config.rate_span_mps * constant<S>(1, 2) : largest<S>()),
           gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
           seen_(logs(config.detection_probability)),
           obscured_(logs(config.obscured_detection_probability)) {}
@@ -71,12 +71,12 @@ class Gate {
     [[nodiscard]] Vec2<S> innovation(const Vec2<S>& x, const Vec2<S>& z) const {
         S range = z[0] - x[0];
         S rate = z[1] - x[1];
-        if (half_span_ > S(0)) {
-            for (int k = 0; k < kMaxFolds && rate > half_span_; ++k) {
+        if (absolute(rate) > most_change_) {
+            for (int k = 0; k < kMaxFolds && rate > most_change_; ++k) {
                 range += config_.alias_range_m;
                 rate -= config_.rate_span_mps;
             }
-            for (int k = 0; k < kMaxFolds && rate < -half_span_; ++k) {
+            for (int k = 0; k < kMaxFolds && rate < -most_change_; ++k) {
                 range -= config_.alias_range_m;
                 rate += config_.rate_span_mps;
             }
@@ -131,8 +131,8 @@ class Gate {
         row.dropped = 0;
         row.obscured = obscured;
         row.log_missed = logs.missed;
+        if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
         for_each_bit(usable, [&](std::uint32_t index) {
-            if (index >= measurements.size()) return;
             const Measurement<S>& m = measurements[index];
             S distance2(0);
             S log_density(0);
@@ -218,7 +218,7 @@ class Gate {
     GateConfig<S> config_;
     Vec2<S> least_variance_;
     Vec2<S> obscured_variance_;
-    S half_span_;
+    S most_change_;  ///< of a range rate, unfolded
     S gate_probability_;
     SensorLogs<S> seen_;
     SensorLogs<S> obscured_;

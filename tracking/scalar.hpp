@@ -70,6 +70,16 @@ constexpr auto reciprocal(S d) {
     }
 }
 
+/// part * reciprocal(whole), bit for bit, for 0 <= part <= whole and whole > 0.
+template <class S>
+constexpr S share(S part, const decltype(reciprocal(S{}))& of_whole) {
+    if constexpr (std::floating_point<S>) {
+        return part * of_whole;
+    } else {
+        return of_whole.share(part);
+    }
+}
+
 /// The largest integer not above x, which must be within int.
 template <class S>
 constexpr int floor_to_int(S x) {
@@ -77,6 +87,16 @@ constexpr int floor_to_int(S x) {
         return static_cast<int>(std::floor(x));
     } else {
         return x.raw() >> S::fraction_bits;
+    }
+}
+
+/// Not below any number.
+template <class S>
+constexpr S largest() {
+    if constexpr (std::floating_point<S>) {
+        return std::numeric_limits<S>::infinity();
+    } else {
+        return S::max();
     }
 }
 
@@ -92,6 +112,16 @@ constexpr bool product_exceeds(S a, S b, S c, S d) {
         return a * b > c * d;
     } else {
         return dsp::product(a.raw(), b.raw()) > dsp::product(c.raw(), d.raw());
+    }
+}
+
+/// weight * x, bit for bit, for a weight of -1..1.
+template <class S>
+constexpr S weighted(S weight, S x) {
+    if constexpr (std::floating_point<S>) {
+        return weight * x;
+    } else {
+        return S::from_raw(dsp::rounded<S::fraction_bits>(dsp::product(weight.raw(), x.raw())));
     }
 }
 

@@ -293,6 +293,7 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
 
 template <class S>
 void Tracker<S>::predict() {
+    const ProcessNoise<S> noise = process_noise(config_.motion);
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& t = track_[i];
         if (by_modes()) {
@@ -302,7 +303,7 @@ void Tracker<S>::predict() {
             t.covariance = all.covariance;
         } else {
             t.x = predict_state(t.x, config_.motion);
-            t.covariance = predict_covariance(t.covariance, config_.motion);
+            t.covariance = predict_covariance(t.covariance, config_.motion, noise);
         }
         t.existence *= config_.survival;
         if (t.age < 0xFFFF) ++t.age;
