@@ -162,6 +162,10 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
     };
     for (std::size_t t = 0; t < rows.size(); ++t) {
         AssociationRow<S>& row = rows[t];
+        if (row.count == 0) {
+            row.missed_weight = S(1);
+            continue;
+        }
         const bool has_dominant = dominants.candidate[t] != detail::kNobody;
         S sum(0);
         for (Candidate<S>& c : row.candidates()) {

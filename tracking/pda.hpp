@@ -19,6 +19,11 @@ namespace tracking {
 template <class S>
 void pda(std::span<AssociationRow<S>> rows) {
     for (AssociationRow<S>& row : rows) {
+        if (row.count == 0) {
+            row.missed = row.missed_weight = S(1);
+            row.log_evidence = row.log_missed;
+            continue;
+        }
         S largest = row.log_missed;
         for (const Candidate<S>& c : row.candidates()) {
             if (c.log_ratio > largest) largest = c.log_ratio;
@@ -74,6 +79,7 @@ class SymmetricSum {
 template <class S>
 void update_with_row(Vec2<S>& x, Mat2<S>& p, const AssociationRow<S>& row,
                      std::span<const Measurement<S>> measurements, const Gate<S>& gate) {
+    if (row.count == 0) return;
     const S negligible = constant<S>(1, 1 << 14);
     struct Move {
         S range, rate;
