@@ -187,13 +187,13 @@ class Innovation<dsp::Fixed<F>> {
 
     [[nodiscard]] bool valid() const { return valid_; }
     [[nodiscard]] S distance2(const Vec2<S>& nu) const {
-        const std::int32_t n0 = nu[0].raw() << k0_;
-        const std::int32_t n1 = nu[1].raw() << k1_;
+        const std::int32_t n0 = nu[0].raw() << (k0_ + 1);
+        const std::int32_t n1 = nu[1].raw() << (k1_ + 1);
         const Solved v = solve(n0, n1);
         const std::int64_t sum = dot(v.v0, n0, v.v1, n1);
-        return static_cast<std::int32_t>(sum >> 32) >> (30 - zeros_) != 0
+        return static_cast<std::int32_t>(sum >> 32) >> (31 - zeros_) != 0
                    ? S::max()
-                   : S::from_raw(shifted(sum, 31 - zeros_));
+                   : S::from_raw(shifted(sum, 32 - zeros_));
     }
     [[nodiscard]] S log_density(S distance2) const {
         constexpr auto kLn2Pi = constant<S>(1'837'877'066'409, 1'000'000'000'000);
@@ -204,7 +204,7 @@ class Innovation<dsp::Fixed<F>> {
         return S::from_raw(-(sum.raw() >> 1)) - kLn2Pi;
     }
     [[nodiscard]] Vec2<S> move(const Vec2<S>& nu) const {
-        const Solved v = solve(nu[0].raw() << k0_, nu[1].raw() << k1_);
+        const Solved v = solve(nu[0].raw() << (k0_ + 1), nu[1].raw() << (k1_ + 1));
         const std::int64_t half = std::int64_t{1} << (30 - zeros_);
         return {S::from_raw(shifted(half + dot(p0_ << k0_, v.v0, cross_ << k1_, v.v1), 31 - zeros_)),
                 S::from_raw(shifted(half + dot(cross_ << k0_, v.v0, p1_ << k1_, v.v1), 31 - zeros_))};
@@ -239,9 +239,11 @@ class Innovation<dsp::Fixed<F>> {
         return static_cast<std::int32_t>(static_cast<std::uint32_t>(wide) >> bits |
                                          static_cast<std::uint32_t>(wide >> 32) << (32 - bits));
     }
+    /// Of 2 nu', so that the upper halves of the sums are what is wanted; they fit as nu is within 10
+    /// standard deviations.
     [[nodiscard]] Solved solve(std::int32_t n0, std::int32_t n1) const {
-        return {shifted(dot(inverse00_, n0, inverse01_, n1), 31),
-                shifted(dot(inverse01_, n0, inverse11_, n1), 31)};
+        return {static_cast<std::int32_t>(dot(inverse00_, n0, inverse01_, n1) >> 32),
+                static_cast<std::int32_t>(dot(inverse01_, n0, inverse11_, n1) >> 32)};
     }
 
     std::int32_t p0_, p1_, cross_;
