@@ -9,16 +9,33 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "dsp/fixed_point.hpp"
 
 namespace dsp {
 
 namespace detail {
+/// The upper half of a product.
 constexpr std::uint32_t high_product(std::uint32_t a, std::uint32_t b) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        std::uint32_t low = 0;
+        std::uint32_t high = 0;
+        asm("umull %0, %1, %2, %3" : "=r"(low), "=r"(high) : "r"(a), "r"(b));
+        return high;
+    }
+#endif
     return static_cast<std::uint32_t>(static_cast<std::uint64_t>(a) * b >> 32);
 }
 constexpr std::int32_t high_product(std::int32_t a, std::int32_t b) {
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        std::int32_t high = 0;
+        asm("smmul %0, %1, %2" : "=r"(high) : "r"(a), "r"(b));
+        return high;
+    }
+#endif
     return static_cast<std::int32_t>(product(a, b) >> 32);
 }
 
@@ -28,7 +45,7 @@ constexpr std::uint32_t inverse(std::uint32_t m) {
     const std::uint32_t upper = (m >> 16) + (m >> 15 & 1);
     std::uint32_t x = (0xFFFF'FFFFU / upper) << 14;
     const auto error = static_cast<std::int32_t>((1U << 30) - high_product(m, x));
-    x += static_cast<std::uint32_t>(static_cast<std::int32_t>((static_cast<std::int64_t>(x) * error) >> 30));
+    x += static_cast<std::uint32_t>(product(static_cast<std::int32_t>(x), error) >> 30);
     return x > 0x7FFF'FFFFU ? 0x7FFF'FFFFU : x;
 }
 
@@ -94,6 +111,15 @@ class Reciprocal {
         return Fixed<F>::from_raw(saturate32(((product(a.raw(), r.mantissa_) >> (r.shift_ - 1)) + 1) >> 1));
     }
 
+    /// The same, bit for bit, for 0 <= part <= d, in five instructions.
+    [[nodiscard]] constexpr Fixed<F> share(Fixed<F> part) const {
+        static_assert(F <= 28);
+        const int zeros = 62 - F - shift_;
+        // Shifted as far left as d can be, the product needs the same shift to the right whatever d is.
+        const std::int32_t high = detail::high_product(part.raw() << (zeros - 1), mantissa_);
+        return Fixed<F>::from_raw((high + (1 << (28 - F))) >> (29 - F));
+    }
+
   private:
     std::int32_t mantissa_ = 0;  // 0: the divisor was zero
     int shift_ = 0;
@@ -110,9 +136,10 @@ template <int F>
 constexpr Fixed<F> exp(Fixed<F> x) {
     // e^x = 2^n 2^u: n integer, u in [0, 1) with 32 fraction bits.
     constexpr std::int64_t kLog2E = 3'098'164'009;  // 31 fraction bits
-    if (x.raw() > (std::int64_t{23} << F)) return Fixed<F>::max();
-    if (x.raw() < -(std::int64_t{23} << F)) return Fixed<F>{};
-    const std::int64_t y = x.raw() * kLog2E >> (F - 1);  // 32 fraction bits
+    constexpr std::int64_t kTwo32 = std::int64_t{1} << 32;
+    const std::int64_t y =
+        (product(x.raw(), static_cast<std::int32_t>(kLog2E - kTwo32)) + x.raw() * kTwo32) >>
+        (F - 1);  // 32 fraction bits
     const auto n = static_cast<int>(y >> 32);
     const auto u = static_cast<std::uint32_t>(y & 0xFFFF'FFFF);
     // 2^u from the nearest of 32 points, by e^t = 1 + t + t^2/2 + t^3/6 for |t| <= ln 2 / 64, error 6e-10.
@@ -127,10 +154,8 @@ constexpr Fixed<F> exp(Fixed<F> x) {
                                                         static_cast<std::int32_t>(point >> 1), step));
     const std::uint32_t power = near_power < 0x7FFF'FFFFU ? near_power : 0x7FFF'FFFFU;  // 30 fraction bits
     const int shift = 30 - F - n;
-    if (shift < 0) return Fixed<F>::max();
-    if (shift > 31) return Fixed<F>{};
-    if (shift == 0) return Fixed<F>::from_raw(static_cast<std::int32_t>(power));
-    return Fixed<F>::from_raw(static_cast<std::int32_t>(((power >> (shift - 1)) + 1) >> 1));
+    if (static_cast<unsigned>(shift) > 31) return shift < 0 ? Fixed<F>::max() : Fixed<F>{};
+    return Fixed<F>::from_raw(static_cast<std::int32_t>((power + (1U << shift >> 1)) >> shift));
 }
 
 /// Natural logarithm within 1/2 LSB + 2^-26. ln of zero or a negative number is the most negative number.

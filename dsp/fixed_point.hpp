@@ -100,16 +100,44 @@ constexpr Int round_shift(Int v, int bits) {
     return static_cast<Int>(floor + (rest > half - (floor & 1) ? 1 : 0));
 }
 
-/// v / 2^Bits, rounded half to even and saturated to 32 bits, 1 <= Bits <= 31 and |v| <= 2^62: what a product
-/// of two numbers of 32 bits becomes. Without a branch but for saturation.
+namespace detail {
+/// v plus what makes the shift by Bits that follows round half to even: a little less than half to an even
+/// number, half to an odd one.
+template <int Bits>
+constexpr std::uint64_t before_rounding_shift(std::int64_t v) {
+    static_assert(Bits >= 1 && Bits <= 31);
+    constexpr std::uint32_t kBelowHalf = (1U << (Bits - 1)) - 1;
+    const auto wide = static_cast<std::uint64_t>(v);
+#ifdef __arm__
+    if (!std::is_constant_evaluated()) {
+        auto low = static_cast<std::uint32_t>(wide);
+        auto high = static_cast<std::uint32_t>(wide >> 32);
+        std::uint32_t rest = 0;
+        asm("lsrs %2, %0, %4\n\tadcs %0, %0, %3\n\tadc %1, %1, #0"  // the carry is whether it is odd
+            : "+r"(low), "+r"(high), "=&r"(rest)
+            : "r"(kBelowHalf), "n"(Bits + 1)
+            : "cc");
+        return std::uint64_t{high} << 32 | low;
+    }
+#endif
+    return wide + (kBelowHalf + (static_cast<std::uint32_t>(wide >> Bits) & 1));
+}
+}  // namespace detail
+
+/// v / 2^Bits, rounded half to even, 1 <= Bits <= 31, where that has 32 bits.
+template <int Bits>
+constexpr std::int32_t rounded(std::int64_t v) {
+    return static_cast<std::int32_t>(
+        static_cast<std::uint32_t>(detail::before_rounding_shift<Bits>(v) >> Bits));
+}
+/// The same saturated to 32 bits, |v| <= 2^62: what a product of two numbers of 32 bits becomes.
 template <int Bits>
 constexpr std::int32_t narrowed(std::int64_t v) {
-    static_assert(Bits >= 1 && Bits <= 31);
-    const auto up = static_cast<std::uint64_t>(v) + (std::uint64_t{1} << (Bits - 1));
+    const std::uint64_t up = detail::before_rounding_shift<Bits>(v);
     const auto high = static_cast<std::int32_t>(up >> 32);
-    auto out = static_cast<std::int32_t>(static_cast<std::uint32_t>(up >> Bits));
-    if (high >> (Bits - 1) != out >> 31) return (high >> 31) ^ std::numeric_limits<std::int32_t>::max();
-    if (static_cast<std::uint32_t>(up) << (32 - Bits) == 0) out &= ~1;  // a tie went up
+    const auto out = static_cast<std::int32_t>(static_cast<std::uint32_t>(up >> Bits));
+    if (high >> (Bits - 1) != out >> 31) [[unlikely]]
+        return (high >> 31) ^ std::numeric_limits<std::int32_t>::max();
     return out;
 }
 
@@ -175,7 +203,7 @@ class Fixed {
 
     constexpr auto operator<=>(const Fixed&) const = default;
 
-    constexpr Fixed operator-() const { return from_raw(saturate32(-static_cast<std::int64_t>(raw_))); }
+    constexpr Fixed operator-() const { return from_raw(saturated_difference(0, raw_)); }
     friend constexpr Fixed operator+(Fixed a, Fixed b) { return from_raw(saturated_sum(a.raw_, b.raw_)); }
     friend constexpr Fixed operator-(Fixed a, Fixed b) {
         return from_raw(saturated_difference(a.raw_, b.raw_));

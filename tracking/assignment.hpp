@@ -7,24 +7,42 @@
 #include <span>
 
 #include "tracking/association.hpp"
+#include "tracking/scratch.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
 
 static_assert(kMaxMeasurements <= 64 && kMaxTracks <= 32, "sets of them are held as bits");
 
-/// What the tracks get, and the prices that prove it optimal: for every row t and candidate c of measurement
-/// j
+/// Which measurement each track gets. `owner` means something for measurements that are candidates of a row.
+struct Matching {
+    static constexpr int kNone = -1;
+
+    std::array<std::int8_t, kMaxTracks> candidate;    ///< of every row, index into its candidates, or kNone
+    std::array<std::int8_t, kMaxMeasurements> owner;  ///< row that got the measurement, or kNone
+
+    /// Nobody gets anything.
+    template <class S>
+    void clear(std::span<const AssociationRow<S>> rows) {
+        for (std::size_t t = 0; t < rows.size(); ++t) {
+            candidate[t] = kNone;
+            for (const Candidate<S>& c : rows[t].candidates()) owner[c.measurement] = kNone;
+        }
+    }
+    template <class S>
+    void claim(std::size_t row, int item, const AssociationRow<S>& r) {
+        candidate[row] = static_cast<std::int8_t>(item);
+        owner[r.item[static_cast<std::size_t>(item)].measurement] = static_cast<std::int8_t>(row);
+    }
+};
+
+/// And the prices that prove it optimal: for every row t and candidate c of measurement j
 ///     weight(t, c) <= row_price[t] + measurement_price[j],   missed_weight(t) <= row_price[t],
 /// with equality on the pairs of the assignment, measurement_price >= 0, and 0 for what nobody got.
 template <class S>
-struct Assignment {
-    static constexpr int kNone = -1;
-
-    std::array<std::int8_t, kMaxTracks> candidate{};    ///< index into the row's candidates, or kNone
-    std::array<std::int8_t, kMaxMeasurements> owner{};  ///< row that got the measurement, or kNone
-    std::array<S, kMaxTracks> row_price{};
-    std::array<S, kMaxMeasurements> measurement_price{};
+struct Assignment : Matching {
+    Scratch<S, kMaxTracks> row_price;
+    Scratch<S, kMaxMeasurements> measurement_price;  ///< as for owner
 };
 
 /// Maximises the sum of `weight(t, c)` over the assigned pairs plus `missed_weight(t)` over the other rows.
@@ -32,38 +50,54 @@ struct Assignment {
 /// Successive shortest augmenting paths with prices (the Hungarian method), rows in order; a tie goes to the
 /// lower measurement index. Fixed point is exact while the weights along a chain of competing tracks sum up
 /// inside the range of S; past that the result is still one-to-one but may not be the best.
-/// At most kMaxTracks rows, measurement indices below kMaxMeasurements. Cost: a row without rivals is one
-/// pass over its candidates; otherwise one such pass for every track it competes with.
+/// At most kMaxTracks rows, measurement indices below kMaxMeasurements. Cost: a row whose best measurement is
+/// free is one pass over its candidates; otherwise one more such pass for every track it competes with.
 template <class S, class Weight, class MissedWeight>
 void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedWeight missed_weight,
                  Assignment<S>& out) {
+    constexpr auto kNone = static_cast<std::int8_t>(Matching::kNone);
     struct Reached {
-        S loss;                    ///< by the best chain of rows that give way and end in this measurement
-        std::int8_t row;           ///< last row of that chain
-        std::int8_t candidate;     ///< which of its candidates the measurement is
-        bool settled;              ///< its owner was asked to give way
-        std::int8_t for_row = -1;  ///< the new row for which all this was written
+        S loss;                 ///< by the best chain of rows that give way and end in this measurement
+        std::int8_t row;        ///< last row of that chain
+        std::int8_t candidate;  ///< which of its candidates the measurement is
+        bool settled;           ///< its owner was asked to give way
+        std::int8_t for_row;    ///< the new row for which all this was written
     };
-    std::array<Reached, kMaxMeasurements> reached;
+    Scratch<Reached, kMaxMeasurements> reached;
     std::array<std::uint8_t, kMaxMeasurements> open;  // measurements reached, in the order they were
 
-    constexpr auto kNone = static_cast<std::int8_t>(Assignment<S>::kNone);
-    out.candidate.fill(kNone);
-    out.owner.fill(kNone);
-    out.measurement_price.fill(S(0));
-
+    for (std::size_t t = 0; t < rows.size(); ++t) {
+        out.candidate[t] = kNone;
+        for (const Candidate<S>& c : rows[t].candidates()) {
+            out.owner[c.measurement] = kNone;
+            out.measurement_price[c.measurement] = S(0);
+            reached[c.measurement].for_row = kNone;
+        }
+    }
     const auto measurement_of = [&](int row, int c) {
         return rows[static_cast<std::size_t>(row)].item[static_cast<std::size_t>(c)].measurement;
     };
 
     const int row_count = static_cast<int>(rows.size());
     for (int start = 0; start < row_count; ++start) {
-        S price = missed_weight(start);
+        const S missed = missed_weight(start);
+        S price(0);
+        int favourite = kNone;
         for (int c = 0; c < rows[static_cast<std::size_t>(start)].count; ++c) {
             const S gain = weight(start, c) - out.measurement_price[measurement_of(start, c)];
-            if (gain > price) price = gain;
+            if (favourite != kNone && !(gain > price)) continue;
+            favourite = c;
+            price = gain;
+        }
+        if (favourite == kNone || price < missed) {
+            out.row_price[static_cast<std::size_t>(start)] = missed;
+            continue;
         }
         out.row_price[static_cast<std::size_t>(start)] = price;
+        if (out.owner[measurement_of(start, favourite)] == kNone) {
+            out.claim(static_cast<std::size_t>(start), favourite, rows[static_cast<std::size_t>(start)]);
+            continue;
+        }
 
         std::size_t open_count = 0;
         S loss = S(0);
@@ -122,7 +156,7 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
         int next = found;
         const auto give_up = [&](int from) {
             const int c = out.candidate[static_cast<std::size_t>(from)];
-            return c == kNone ? Assignment<S>::kNone : static_cast<int>(measurement_of(from, c));
+            return c == kNone ? Matching::kNone : static_cast<int>(measurement_of(from, c));
         };
         if (found == kNone) {
             next = give_up(loser);

@@ -6,14 +6,43 @@
 
 namespace tracking {
 
-/// Calls visit(i) for every bit i of `set`, ascending. By halves: a 64-bit count of zeros is a library call
-/// on the targets.
-template <class Visit>
-constexpr void for_each_bit(std::uint64_t set, Visit&& visit) {
-    for (std::uint32_t half = 0; half < 2; ++half) {
-        for (auto left = static_cast<std::uint32_t>(set >> 32 * half); left != 0; left &= left - 1)
-            visit(static_cast<std::uint32_t>(std::countr_zero(left)) + 32 * half);
-    }
-}
+/// The members of a set, ascending: `for (const std::uint32_t i : Bits(set))`. By halves: a 64-bit count of
+/// zeros is a library call on the targets.
+class Bits {
+  public:
+    explicit constexpr Bits(std::uint64_t set) : set_(set) {}
+
+    struct End {};
+    class Iterator {
+      public:
+        explicit constexpr Iterator(std::uint64_t set)
+            : left_(static_cast<std::uint32_t>(set)), upper_(static_cast<std::uint32_t>(set >> 32)) {
+            if (left_ == 0) go_up();
+        }
+        constexpr std::uint32_t operator*() const {
+            return static_cast<std::uint32_t>(std::countr_zero(left_)) + base_;
+        }
+        constexpr Iterator& operator++() {
+            left_ &= left_ - 1;
+            if (left_ == 0 && base_ == 0) go_up();
+            return *this;
+        }
+        constexpr bool operator!=(End /*unused*/) const { return left_ != 0; }
+
+      private:
+        constexpr void go_up() {
+            left_ = upper_;
+            base_ = 32;
+        }
+        std::uint32_t left_;
+        std::uint32_t upper_;
+        std::uint32_t base_ = 0;
+    };
+    [[nodiscard]] constexpr Iterator begin() const { return Iterator(set_); }
+    [[nodiscard]] constexpr End end() const { return {}; }
+
+  private:
+    std::uint64_t set_;
+};
 
 }  // namespace tracking

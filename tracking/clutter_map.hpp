@@ -20,8 +20,10 @@ class ClutterMap {
 
     /// `density`: of clutter expected everywhere, a frame per m (m/s). `rate_span_mps`: of the measured range
     /// rates, -span/2 to span/2; 0: unambiguous, 64 m/s are mapped.
-    ClutterMap(S density, S rate_span_mps)
-        : span_(rate_span_mps > S(0) ? rate_span_mps : S(kRates)), per_rate_(S(kRates) * reciprocal(span_)) {
+    ClutterMap(S density, S rate_span_mps) {
+        const S span = rate_span_mps > S(0) ? rate_span_mps : S(kRates);
+        half_span_ = span * constant<S>(1, 2);
+        per_rate_ = S(kRates) * reciprocal(span);
         const S least = constant<S>(1, std::int64_t{1} << 22);
         const S cell = S(kBandM) * reciprocal(per_rate_);
         per_count_ = S(1) * reciprocal(S(cell * (density < least ? least : density)));
@@ -68,10 +70,10 @@ class ClutterMap {
             return static_cast<std::size_t>(floor_to_int(v < S(0) ? S(0) : (v > last ? last : v)));
         };
         return index(z[0] * constant<S>(1, kBandM), kBands) * kRates +
-               index((z[1] + span_ * constant<S>(1, 2)) * per_rate_, kRates);
+               index((z[1] + half_span_) * per_rate_, kRates);
     }
 
-    S span_;
+    S half_span_;
     S per_rate_;
     S per_count_;
     std::array<std::uint16_t, std::size_t{kBands} * kRates> mean_{};  ///< detections a frame

@@ -77,12 +77,9 @@ ObservableExistence<S> update_observable(const ObservableExistence<S>& predicted
 template <class S>
 S updated_existence(S psi, S log_evidence) {
     const S doubt = S(1) - psi;
-    if (log_evidence > S(0)) {
-        const S against = doubt * exp(-log_evidence);
-        return psi * reciprocal(S(psi + against));
-    }
-    const S in_favour = psi * exp(log_evidence);
-    return in_favour * reciprocal(S(in_favour + doubt));
+    const S part = log_evidence > S(0) ? psi : psi * exp(log_evidence);
+    const S whole = part + (log_evidence > S(0) ? doubt * exp(-log_evidence) : doubt);
+    return whole > S(0) ? share(part, reciprocal(whole)) : S(0);
 }
 
 namespace detail {

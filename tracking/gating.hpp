@@ -62,7 +62,7 @@ class Gate {
                           config.min_rate_sigma_mps * config.min_rate_sigma_mps),
           obscured_variance_(config.obscured_range_sigma_m * config.obscured_range_sigma_m,
                              config.obscured_rate_sigma_mps * config.obscured_rate_sigma_mps),
-          half_span_(config.rate_span_mps * constant<S>(1, 2)),
+          most_change_(config.rate_span_mps > S(0) ? config.rate_span_mps * constant<S>(1, 2) : largest<S>()),
           gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
           seen_(logs(config.detection_probability)),
           obscured_(logs(config.obscured_detection_probability)) {}
@@ -71,12 +71,12 @@ class Gate {
     [[nodiscard]] Vec2<S> innovation(const Vec2<S>& x, const Vec2<S>& z) const {
         S range = z[0] - x[0];
         S rate = z[1] - x[1];
-        if (half_span_ > S(0)) {
-            for (int k = 0; k < kMaxFolds && rate > half_span_; ++k) {
+        if (absolute(rate) > most_change_) {
+            for (int k = 0; k < kMaxFolds && rate > most_change_; ++k) {
                 range += config_.alias_range_m;
                 rate -= config_.rate_span_mps;
             }
-            for (int k = 0; k < kMaxFolds && rate < -half_span_; ++k) {
+            for (int k = 0; k < kMaxFolds && rate < -most_change_; ++k) {
                 range -= config_.alias_range_m;
                 rate += config_.rate_span_mps;
             }
@@ -92,15 +92,13 @@ class Gate {
         return {r[0] + obscured_variance_[0], r[1] + obscured_variance_[1]};
     }
 
-    /// How far in range rate a measurement of at most this variance can be from a track of variance p11 in
-    /// its gate.
-    [[nodiscard]] S rate_reach(S p11, S variance, bool obscured) const {
-        const S r = rate_variance(variance) + (obscured ? obscured_variance_[1] : S(0));
-        return sqrt_above(S(config_.gate * S(p11 + r)));
+    /// How far in range and in range rate a measurement of at most these variances can be from a track of
+    /// covariance P in its gate.
+    [[nodiscard]] S range_reach(const Mat2<S>& p, S variance, bool obscured) const {
+        return reach(p(0, 0), variance, least_variance_[0], obscured ? obscured_variance_[0] : S(0));
     }
-    /// R of the range rate of a measurement of this variance.
-    [[nodiscard]] S rate_variance(S variance) const {
-        return variance > least_variance_[1] ? variance : least_variance_[1];
+    [[nodiscard]] S rate_reach(const Mat2<S>& p, S variance, bool obscured) const {
+        return reach(p(1, 1), variance, least_variance_[1], obscured ? obscured_variance_[1] : S(0));
     }
 
     /// ln of the likelihood ratio PD N(nu; 0, S) / lambda of a measurement inside the gate; nothing outside,
@@ -121,25 +119,25 @@ class Gate {
 
     /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`. Of more
     /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess(z)`: ln of the clutter
-    /// density at z over config().clutter_density, asked of measurements in the gate only.
+    /// density at z over config().clutter_density, asked of measurements in the gate only. `range_reach`:
+    /// what is farther away in range need not be looked at closer.
     template <class LogExcess>
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
               std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured,
-              LogExcess log_excess) const {
+              LogExcess log_excess, S range_reach = largest<S>()) const {
         const SensorLogs<S>& logs = sensor(obscured);
         row.count = 0;
         row.dropped = 0;
         row.obscured = obscured;
         row.log_missed = logs.missed;
-        for_each_bit(usable, [&](std::uint32_t index) {
-            if (index >= measurements.size()) return;
+        if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
+        const S folded_reach = range_reach + absolute(config_.alias_range_m) * kMaxFolds;
+        for (const std::uint32_t index : Bits(usable)) {
             const Measurement<S>& m = measurements[index];
-            S distance2(0);
-            S log_density(0);
-            if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) return;
-            insert(row, {static_cast<std::uint16_t>(index), logs.detected + log_density - log_excess(m.z),
-                         S(0), S(0)});
-        });
+            if (absolute(m.z[0] - x[0]) > folded_reach) continue;
+            const Vec2<S> nu = innovation(x, m.z);
+            if (absolute(nu[0]) <= range_reach) consider(row, index, m, nu, p, log_excess);
+        }
     }
     /// The same with clutter as expected everywhere.
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
@@ -178,8 +176,12 @@ class Gate {
 
     [[nodiscard]] const GateConfig<S>& config() const { return config_; }
 
+    static constexpr int kMaxFolds = 3;  ///< that innovation() takes back
+
   private:
-    static constexpr int kMaxFolds = 3;
+    [[nodiscard]] S reach(S p, S variance, S least, S obscured) const {
+        return sqrt_above(config_.gate, S(p + ((variance > least ? variance : least) + obscured)));
+    }
 
     /// ln V of a gate that is not empty, at the accuracy of its first measurement: ln(g^2 / 2) - ln N(0; 0,
     /// S), since V = pi g^2 sqrt|S|.
@@ -200,6 +202,17 @@ class Gate {
                 floored_ln(S(1) - detection_probability * gate_probability_)};
     }
 
+    /// Not inlined: the loop around it turns most measurements away.
+    template <class LogExcess>
+    [[gnu::noinline]] void consider(AssociationRow<S>& row, std::uint32_t index, const Measurement<S>& m,
+                                    const Vec2<S>& nu, const Mat2<S>& p, LogExcess& log_excess) const {
+        S distance2(0);
+        S log_density(0);
+        if (!test(nu, p, noise(m, row.obscured), distance2, log_density)) return;
+        const S log_ratio = sensor(row.obscured).detected + log_density - log_excess(m.z);
+        insert(row, {static_cast<std::uint16_t>(index), log_ratio, S(0), S(0)});
+    }
+
     static void insert(AssociationRow<S>& row, const Candidate<S>& candidate) {
         if (row.count < kMaxGated) {
             row.item[static_cast<std::size_t>(row.count++)] = candidate;
@@ -218,7 +231,7 @@ class Gate {
     GateConfig<S> config_;
     Vec2<S> least_variance_;
     Vec2<S> obscured_variance_;
-    S half_span_;
+    S most_change_;  ///< of a range rate, unfolded
     S gate_probability_;
     SensorLogs<S> seen_;
     SensorLogs<S> obscured_;

@@ -32,18 +32,32 @@ Vec2<S> predict_state(const Vec2<S>& x, const MotionModel<S>& model) {
     return {x[0] + x[1] * model.period_s, x[1]};
 }
 
-/// P <- F P F' + Q, symmetric by construction.
+/// Q, symmetric.
 template <class S>
-Mat2<S> predict_covariance(const Mat2<S>& p, const MotionModel<S>& model) {
+struct ProcessNoise {
+    S range, cross, rate;
+};
+template <class S>
+ProcessNoise<S> process_noise(const MotionModel<S>& model) {
+    const S rate_step = model.acceleration_sigma_mps2 * model.period_s;  // sigma of the rate's change
+    const S range_step = rate_step * model.period_s * constant<S>(1, 2);
+    return {range_step * range_step, range_step * rate_step, rate_step * rate_step};
+}
+
+/// P <- F P F' + Q, symmetric by construction. `noise` is the model's, the same for all tracks.
+template <class S>
+Mat2<S> predict_covariance(const Mat2<S>& p, const MotionModel<S>& model, const ProcessNoise<S>& noise) {
     const S t = model.period_s;
-    const S rate_step = model.acceleration_sigma_mps2 * t;  // sigma of the rate's change over a period
-    const S range_step = rate_step * t * constant<S>(1, 2);
     const S cross = p(0, 1) + t * p(1, 1);
     Mat2<S> out;
-    out(0, 0) = p(0, 0) + t * (p(0, 1) + cross) + range_step * range_step;
-    out(0, 1) = out(1, 0) = cross + range_step * rate_step;
-    out(1, 1) = p(1, 1) + rate_step * rate_step;
+    out(0, 0) = p(0, 0) + t * (p(0, 1) + cross) + noise.range;
+    out(0, 1) = out(1, 0) = cross + noise.cross;
+    out(1, 1) = p(1, 1) + noise.rate;
     return out;
+}
+template <class S>
+Mat2<S> predict_covariance(const Mat2<S>& p, const MotionModel<S>& model) {
+    return predict_covariance(p, model, process_noise(model));
 }
 
 /// A symmetric positive 2 x 2 matrix as L D L', L = [1 0; l 1], D = diag(d1, d2). No determinant is formed:
@@ -156,9 +170,8 @@ class Innovation<dsp::Fixed<F>> {
         r1_ = s1 - p1_;
         k0_ = (std::countl_zero(static_cast<std::uint32_t>(s0)) - 1) >> 1;
         k1_ = (std::countl_zero(static_cast<std::uint32_t>(s1)) - 1) >> 1;
-        const std::int64_t wide_cross = dsp::product(cross_, 1 << (k0_ + k1_));
-        const auto cross = static_cast<std::int32_t>(wide_cross);
-        if (cross != wide_cross) return;
+        const std::int32_t cross = cross_ << (k0_ + k1_);
+        if (cross >> (k0_ + k1_) != cross_) return;
         const std::int32_t scaled0 = s0 << 2 * k0_;
         const std::int32_t scaled1 = s1 << 2 * k1_;
         const std::int64_t determinant = dsp::product(scaled0, scaled1) - dsp::product(cross, cross);
@@ -169,17 +182,18 @@ class Innovation<dsp::Fixed<F>> {
         inverse00_ = dsp::detail::high_product(scaled1, inverse);
         inverse01_ = -dsp::detail::high_product(cross, inverse);
         inverse11_ = dsp::detail::high_product(scaled0, inverse);
+        valid_ = true;
     }
 
-    [[nodiscard]] bool valid() const { return mantissa_ != 0; }
+    [[nodiscard]] bool valid() const { return valid_; }
     [[nodiscard]] S distance2(const Vec2<S>& nu) const {
-        const std::int32_t n0 = nu[0].raw() << k0_;
-        const std::int32_t n1 = nu[1].raw() << k1_;
+        const std::int32_t n0 = nu[0].raw() << (k0_ + 1);
+        const std::int32_t n1 = nu[1].raw() << (k1_ + 1);
         const Solved v = solve(n0, n1);
         const std::int64_t sum = dot(v.v0, n0, v.v1, n1);
-        return static_cast<std::int32_t>(sum >> 32) >> (30 - zeros_) != 0
+        return static_cast<std::int32_t>(sum >> 32) >> (31 - zeros_) != 0
                    ? S::max()
-                   : S::from_raw(shifted(sum, 31 - zeros_));
+                   : S::from_raw(shifted(sum, 32 - zeros_));
     }
     [[nodiscard]] S log_density(S distance2) const {
         constexpr auto kLn2Pi = constant<S>(1'837'877'066'409, 1'000'000'000'000);
@@ -190,7 +204,7 @@ class Innovation<dsp::Fixed<F>> {
         return S::from_raw(-(sum.raw() >> 1)) - kLn2Pi;
     }
     [[nodiscard]] Vec2<S> move(const Vec2<S>& nu) const {
-        const Solved v = solve(nu[0].raw() << k0_, nu[1].raw() << k1_);
+        const Solved v = solve(nu[0].raw() << (k0_ + 1), nu[1].raw() << (k1_ + 1));
         const std::int64_t half = std::int64_t{1} << (30 - zeros_);
         return {S::from_raw(shifted(half + dot(p0_ << k0_, v.v0, cross_ << k1_, v.v1), 31 - zeros_)),
                 S::from_raw(shifted(half + dot(cross_ << k0_, v.v0, p1_ << k1_, v.v1), 31 - zeros_))};
@@ -203,9 +217,9 @@ class Innovation<dsp::Fixed<F>> {
         const std::int32_t kept01 = shifted(dsp::product(r0_ << k0_, inverse01_), 32 - zeros_);
         const auto positive = [](std::int32_t v) { return S::from_raw(v > 0 ? v : 1); };
         Mat2<S> out;
-        out(0, 0) = positive(dsp::narrowed<30>(dsp::product(r0_, gain0)));
-        out(1, 1) = positive(dsp::narrowed<30>(dsp::product(r1_, gain1)));
-        out(0, 1) = out(1, 0) = S::from_raw(-dsp::narrowed<30>(dsp::product(kept01, r1_ << k1_)));
+        out(0, 0) = positive(dsp::rounded<30>(dsp::product(r0_, gain0)));
+        out(1, 1) = positive(dsp::rounded<30>(dsp::product(r1_, gain1)));
+        out(0, 1) = out(1, 0) = S::from_raw(-dsp::rounded<30>(dsp::product(kept01, r1_ << k1_)));
         return out;
     }
 
@@ -225,15 +239,18 @@ class Innovation<dsp::Fixed<F>> {
         return static_cast<std::int32_t>(static_cast<std::uint32_t>(wide) >> bits |
                                          static_cast<std::uint32_t>(wide >> 32) << (32 - bits));
     }
+    /// Of 2 nu', so that the upper halves of the sums are what is wanted; they fit as nu is within 10
+    /// standard deviations.
     [[nodiscard]] Solved solve(std::int32_t n0, std::int32_t n1) const {
-        return {shifted(dot(inverse00_, n0, inverse01_, n1), 31),
-                shifted(dot(inverse01_, n0, inverse11_, n1), 31)};
+        return {static_cast<std::int32_t>(dot(inverse00_, n0, inverse01_, n1) >> 32),
+                static_cast<std::int32_t>(dot(inverse01_, n0, inverse11_, n1) >> 32)};
     }
 
     std::int32_t p0_, p1_, cross_;
     std::int32_t r0_ = 0, r1_ = 0;
     std::int32_t inverse00_ = 0, inverse01_ = 0, inverse11_ = 0;
-    std::uint32_t mantissa_ = 0;  // of the determinant, 0: not valid
+    bool valid_ = false;
+    std::uint32_t mantissa_ = 0;  // of the determinant
     int k0_ = 0, k1_ = 0, zeros_ = 0;
 };
 

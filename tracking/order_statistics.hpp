@@ -76,23 +76,9 @@ inline constexpr OrderStatisticsConfig<S> kLeeKim2000{S(4),
 
 namespace detail {
 
-inline constexpr int kNobody = -1;
-
-/// For each row the candidate that dominates it, or kNobody; for each measurement the row it dominates.
-struct Dominants {
-    std::array<std::int8_t, kMaxTracks> candidate;
-    std::array<std::int8_t, kMaxMeasurements> owner;
-
-    Dominants() {
-        candidate.fill(kNobody);
-        owner.fill(kNobody);
-    }
-    template <class S>
-    void claim(std::size_t row, int item, const AssociationRow<S>& r) {
-        candidate[row] = static_cast<std::int8_t>(item);
-        owner[r.item[static_cast<std::size_t>(item)].measurement] = static_cast<std::int8_t>(row);
-    }
-};
+/// For each row the candidate that dominates it, for each measurement the row it dominates.
+using Dominants = Matching;
+inline constexpr int kNobody = Matching::kNone;
 
 /// Largest beta among the row's measurements nobody owns; kNobody when there is none.
 template <class S>
@@ -108,6 +94,7 @@ int largest_free(const AssociationRow<S>& row, const Dominants& dominants) {
 
 template <class S>
 void choose_by_index(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
+    dominants.clear(rows);
     for (std::size_t t = 0; t < rows.size(); ++t) {
         const int item = largest_free(rows[t], dominants);
         if (item != kNobody) dominants.claim(t, item, rows[t]);
@@ -116,6 +103,7 @@ void choose_by_index(std::span<const AssociationRow<S>> rows, Dominants& dominan
 
 template <class S>
 void choose_by_strength(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
+    dominants.clear(rows);
     for (std::size_t round = 0; round < rows.size(); ++round) {
         std::size_t strongest = rows.size();
         int strongest_item = kNobody;
@@ -137,17 +125,13 @@ void choose_by_strength(std::span<const AssociationRow<S>> rows, Dominants& domi
 }
 
 template <class S>
-void choose_optimally(std::span<const AssociationRow<S>> rows, Dominants& dominants) {
-    Assignment<S> best;
+void choose_optimally(std::span<const AssociationRow<S>> rows, Assignment<S>& dominants) {
     assign_best(
         rows,
         [&](int t, int c) {
             return rows[static_cast<std::size_t>(t)].item[static_cast<std::size_t>(c)].log_ratio;
         },
-        [&](int t) { return rows[static_cast<std::size_t>(t)].log_missed; }, best);
-    for (std::size_t t = 0; t < rows.size(); ++t) {
-        if (best.candidate[t] != kNobody) dominants.claim(t, best.candidate[t], rows[t]);
-    }
+        [&](int t) { return rows[static_cast<std::size_t>(t)].log_missed; }, dominants);
 }
 
 }  // namespace detail
@@ -157,7 +141,7 @@ void choose_optimally(std::span<const AssociationRow<S>> rows, Dominants& domina
 template <class S>
 void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsConfig<S>& config) {
     const std::span<const AssociationRow<S>> read(rows);
-    detail::Dominants dominants;
+    Assignment<S> dominants;
     switch (config.precedence) {
         case Precedence::index:
             detail::choose_by_index(read, dominants);
@@ -169,27 +153,27 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             detail::choose_optimally(read, dominants);
             break;
     }
+    const auto reduced = [&](const Candidate<S>& c, int owner, bool has_dominant) {
+        if (config.reduction == Reduction::divide) return S(c.beta * reciprocal(config.alpha));
+        if (owner == detail::kNobody) return c.beta;
+        if (config.reduction == Reduction::exclusive && has_dominant) return S(0);
+        const auto o = static_cast<std::size_t>(owner);
+        return S(c.beta * (S(1) - rows[o].item[static_cast<std::size_t>(dominants.candidate[o])].beta));
+    };
     for (std::size_t t = 0; t < rows.size(); ++t) {
         AssociationRow<S>& row = rows[t];
+        if (row.count == 0) {
+            row.missed_weight = S(1);
+            continue;
+        }
         const bool has_dominant = dominants.candidate[t] != detail::kNobody;
         S sum(0);
-        for (int i = 0; i < row.count; ++i) {
-            Candidate<S>& c = row.item[static_cast<std::size_t>(i)];
-            c.weight = c.beta;
+        for (Candidate<S>& c : row.candidates()) {
             const int owner = dominants.owner[c.measurement];
-            const bool claimed = owner != detail::kNobody && owner != static_cast<int>(t);
-            if (i != dominants.candidate[t] && (claimed || config.reduced == Reduced::all_but_dominant)) {
-                if (config.reduction == Reduction::divide) {
-                    c.weight = c.beta * reciprocal(config.alpha);
-                } else if (claimed && config.reduction == Reduction::exclusive && has_dominant) {
-                    c.weight = S(0);
-                } else if (claimed) {
-                    const auto o = static_cast<std::size_t>(owner);
-                    const Candidate<S>& claim =
-                        rows[o].item[static_cast<std::size_t>(dominants.candidate[o])];
-                    c.weight = c.beta * (S(1) - claim.beta);
-                }
-            }
+            const bool own = owner == static_cast<int>(t);
+            const bool may_stay =
+                own || (owner == detail::kNobody && config.reduced == Reduced::claimed_by_others);
+            c.weight = may_stay ? c.beta : reduced(c, owner, has_dominant);
             sum += c.weight;
         }
         row.missed_weight = config.missed == MissedColumn::keep ? row.missed : S(0);
@@ -199,8 +183,8 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             sum = S(1);
         }
         const auto scale = reciprocal(sum);
-        row.missed_weight = row.missed_weight * scale;
-        for (Candidate<S>& c : row.candidates()) c.weight = c.weight * scale;
+        row.missed_weight = share(row.missed_weight, scale);
+        for (Candidate<S>& c : row.candidates()) c.weight = share(c.weight, scale);
     }
     if (config.covariance == CovarianceBetas::original) return;
     for (std::size_t t = 0; t < rows.size(); ++t) {

@@ -9,6 +9,7 @@
 #include "tracking/association.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/kalman.hpp"
+#include "tracking/scratch.hpp"
 #include "tracking/wide_sum.hpp"
 
 namespace tracking {
@@ -18,6 +19,11 @@ namespace tracking {
 template <class S>
 void pda(std::span<AssociationRow<S>> rows) {
     for (AssociationRow<S>& row : rows) {
+        if (row.count == 0) {
+            row.missed = row.missed_weight = S(1);
+            row.log_evidence = row.log_missed;
+            continue;
+        }
         S largest = row.log_missed;
         for (const Candidate<S>& c : row.candidates()) {
             if (c.log_ratio > largest) largest = c.log_ratio;
@@ -30,9 +36,8 @@ void pda(std::span<AssociationRow<S>> rows) {
         }
         row.log_evidence = largest + ln(sum);
         const auto scale = reciprocal(sum);
-        row.missed = row.missed * scale;
-        for (Candidate<S>& c : row.candidates()) c.beta = c.beta * scale;
-        use_betas_as_weights(row);
+        for (Candidate<S>& c : row.candidates()) c.weight = c.beta = share(c.beta, scale);
+        row.missed_weight = row.missed = share(row.missed, scale);
     }
 }
 
@@ -45,10 +50,10 @@ class SymmetricSum {
         sum01_.add_product(weight, m(0, 1));
         sum11_.add_product(weight, m(1, 1));
     }
-    /// weight v v'.
+    /// weight v v', 0 <= weight <= 1.
     void add_outer(S weight, const Vec2<S>& v) {
-        const S wv0 = weight * v[0];
-        const S wv1 = weight * v[1];
+        const S wv0 = weighted(weight, v[0]);
+        const S wv1 = weighted(weight, v[1]);
         sum00_.add_product(wv0, v[0]);
         sum01_.add_product(wv0, v[1]);
         sum11_.add_product(wv1, v[1]);
@@ -74,8 +79,12 @@ class SymmetricSum {
 template <class S>
 void update_with_row(Vec2<S>& x, Mat2<S>& p, const AssociationRow<S>& row,
                      std::span<const Measurement<S>> measurements, const Gate<S>& gate) {
+    if (row.count == 0) return;
     const S negligible = constant<S>(1, 1 << 14);
-    std::array<Vec2<S>, kMaxGated> moves;
+    struct Move {
+        S range, rate;
+    };
+    Scratch<Move, kMaxGated> moves;
     WideSum<S> mean_range, mean_rate;
     SymmetricSum<S> spread;
     spread.add(row.missed, p);
@@ -84,9 +93,10 @@ void update_with_row(Vec2<S>& x, Mat2<S>& p, const AssociationRow<S>& row,
         if (c.beta < negligible && c.weight < negligible) continue;
         const Measurement<S>& m = measurements[c.measurement];
         const Innovation<S> innovation(p, gate.noise(m, row.obscured));
-        moves[i] = innovation.move(gate.innovation(x, m.z));
-        mean_range.add_product(c.weight, moves[i][0]);
-        mean_rate.add_product(c.weight, moves[i][1]);
+        const Vec2<S> move = innovation.move(gate.innovation(x, m.z));
+        moves[i] = {move[0], move[1]};
+        mean_range.add_product(c.weight, move[0]);
+        mean_rate.add_product(c.weight, move[1]);
         if (!(c.beta < negligible)) spread.add(c.beta, innovation.posterior());
     }
     const Vec2<S> mean(mean_range.value(), mean_rate.value());
@@ -94,7 +104,7 @@ void update_with_row(Vec2<S>& x, Mat2<S>& p, const AssociationRow<S>& row,
     for (std::size_t i = 0; i < static_cast<std::size_t>(row.count); ++i) {
         const S beta = row.item[i].beta;
         if (beta < negligible) continue;
-        spread.add_outer(beta, Vec2<S>(moves[i][0] - mean[0], moves[i][1] - mean[1]));
+        spread.add_outer(beta, Vec2<S>(moves[i].range - mean[0], moves[i].rate - mean[1]));
     }
     x[0] += mean[0];
     x[1] += mean[1];

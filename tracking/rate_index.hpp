@@ -41,20 +41,39 @@ class RateIndex {
     }
     [[nodiscard]] S largest_variance() const { return largest_variance_; }
 
-    /// Those within `reach` of `rate` but for folding, as bits, and perhaps some up to 2 % of the span
-    /// farther. Cost five instructions a sector within reach.
-    [[nodiscard]] std::uint64_t near(S rate, S reach) const {
-        const std::uint64_t width = turns(reach) + kMargin;
-        if (!folded_ || width >= (std::uint64_t{1} << 31) - (1U << kSectorBits))
-            return count_ == 0 ? 0 : ~std::uint64_t{0} >> (64 - count_);
-        const std::uint32_t middle = angle(rate);
-        const std::uint32_t from = (middle - static_cast<std::uint32_t>(width)) >> kSectorBits;
-        const std::uint32_t to = (middle + static_cast<std::uint32_t>(width)) >> kSectorBits;
-        Set set = sector_[to];
-        for (std::uint32_t i = from; i != to; i = (i + 1) % kSectors) {
-            set[0] |= sector_[i][0];
-            set[1] |= sector_[i][1];
+    /// A reach in range rate as near() wants it; the same for all range rates asked about.
+    [[nodiscard]] std::uint32_t width(S reach) const {
+        if constexpr (std::floating_point<S>) {
+            return folded_ && reach * scale_ < constant<S>(12, 25)
+                       ? static_cast<std::uint32_t>(std::ldexp(reach * scale_, 32)) + kMargin
+                       : kEverything;
+        } else {
+            constexpr std::int32_t kMost = (1 << kScaleBits) / 25 * 12;
+            const std::int64_t turns = dsp::product(reach.raw(), scale_);
+            return folded_ && (turns >> 32) < kMost
+                       ? static_cast<std::uint32_t>(turns >> kScaleBits) + kMargin
+                       : kEverything;
         }
+    }
+    /// Those within the reach of `rate` but for folding, as bits, and perhaps some up to 2 % of the span
+    /// farther. Cost five instructions a sector within reach.
+    [[nodiscard]] std::uint64_t near(S rate, std::uint32_t width) const {
+        if (width == kEverything) return count_ == 0 ? 0 : ~std::uint64_t{0} >> (64 - count_);
+        const std::uint32_t middle = angle(rate);
+        const std::uint32_t to = (middle + width) >> kSectorBits;
+        std::uint32_t i = (middle - width) >> kSectorBits;
+        Set set{};
+        const auto add_up_to = [&](std::uint32_t end) {
+            for (; i < end; ++i) {
+                set[0] |= sector_[i][0];
+                set[1] |= sector_[i][1];
+            }
+        };
+        if (i > to) {
+            add_up_to(kSectors);
+            i = 0;
+        }
+        add_up_to(to + 1);
         return static_cast<std::uint64_t>(set[1]) << 32 | set[0];
     }
 
@@ -64,17 +83,10 @@ class RateIndex {
     static constexpr int kSectorBits = 26;  ///< of the angle within a sector
     static constexpr std::uint32_t kSectors = 64;
     static constexpr int kScaleBits = 16;
+    static constexpr std::uint32_t kEverything = ~0U;   ///< a width past half a turn
     static constexpr std::uint32_t kMargin = 1U << 21;  ///< rounding of the scale, 512 m/s away
 
-    /// 2^32 for a span, of a number that is not negative; saturates at 2^32.
-    [[nodiscard]] std::uint64_t turns(S rate) const {
-        if constexpr (std::floating_point<S>) {
-            const S t = rate * scale_;
-            return t < 1 ? static_cast<std::uint64_t>(std::ldexp(t, 32)) : std::uint64_t{1} << 32;
-        } else {
-            return static_cast<std::uint64_t>(dsp::product(rate.raw(), scale_)) >> kScaleBits;
-        }
-    }
+    /// 2^32 for a span.
     [[nodiscard]] std::uint32_t angle(S rate) const {
         if constexpr (std::floating_point<S>) {
             const S t = rate * scale_;

@@ -70,6 +70,16 @@ constexpr auto reciprocal(S d) {
     }
 }
 
+/// part * reciprocal(whole), bit for bit, for 0 <= part <= whole and whole > 0.
+template <class S>
+constexpr S share(S part, const decltype(reciprocal(S{}))& of_whole) {
+    if constexpr (std::floating_point<S>) {
+        return part * of_whole;
+    } else {
+        return of_whole.share(part);
+    }
+}
+
 /// The largest integer not above x, which must be within int.
 template <class S>
 constexpr int floor_to_int(S x) {
@@ -77,6 +87,16 @@ constexpr int floor_to_int(S x) {
         return static_cast<int>(std::floor(x));
     } else {
         return x.raw() >> S::fraction_bits;
+    }
+}
+
+/// Not below any number.
+template <class S>
+constexpr S largest() {
+    if constexpr (std::floating_point<S>) {
+        return std::numeric_limits<S>::infinity();
+    } else {
+        return S::max();
     }
 }
 
@@ -95,18 +115,32 @@ constexpr bool product_exceeds(S a, S b, S c, S d) {
     }
 }
 
-/// A number not below sqrt(x), and not more than 7 % and 3 LSB above: the mean of a and x / a for a power of
-/// two a.
+/// weight * x, bit for bit, for a weight of -1..1.
 template <class S>
-constexpr S sqrt_above(S x) {
+constexpr S weighted(S weight, S x) {
     if constexpr (std::floating_point<S>) {
-        return std::sqrt(x) * (1 + std::numeric_limits<S>::epsilon());
+        return weight * x;
     } else {
-        if (x.raw() <= 0) return S(0);
-        const std::uint64_t square = static_cast<std::uint64_t>(x.raw()) << S::fraction_bits;
-        const int k = (64 - std::countl_zero(square)) / 2;
-        const std::uint64_t sum = (std::uint64_t{1} << k) + (square >> k);
-        return S::from_raw(dsp::saturate32(static_cast<std::int64_t>(sum / 2) + 2));
+        return S::from_raw(dsp::rounded<S::fraction_bits>(dsp::product(weight.raw(), x.raw())));
+    }
+}
+
+/// A number not below sqrt(a b) for a >= 0, and above it by 7 % or 2^15 + 2 LSB at most: the mean of c and
+/// a b / c for a power of two c of at least 2^16 LSB. 0 if b is negative.
+template <class S>
+constexpr S sqrt_above(S a, S b) {
+    if constexpr (std::floating_point<S>) {
+        return b > S(0) ? std::sqrt(a * b) * (1 + std::numeric_limits<S>::epsilon()) : S(0);
+    } else {
+        const std::int64_t square = dsp::product(a.raw(), b.raw());
+        const auto high = static_cast<std::int32_t>(square >> 32);
+        if (high < 0) return S(0);
+        const int k = (64 - std::countl_zero(static_cast<std::uint32_t>(high))) / 2;
+        const std::uint32_t other = static_cast<std::uint32_t>(square) >> k | static_cast<std::uint32_t>(high)
+                                                                                  << (32 - k);
+        const std::uint32_t mean = (1U << (k - 1)) + (other >> 1) + 2;
+        constexpr std::uint32_t kMax = std::numeric_limits<std::int32_t>::max();
+        return S::from_raw(static_cast<std::int32_t>(mean < kMax ? mean : kMax));
     }
 }
 

@@ -5,6 +5,7 @@
 /// this frame and one of the last two; confirm, merge, delete.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -22,6 +23,7 @@
 #include "tracking/pda.hpp"
 #include "tracking/rate_index.hpp"
 #include "tracking/scalar.hpp"
+#include "tracking/scratch.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
@@ -171,9 +173,8 @@ class Tracker {
     /// What is the same for all starts with a pending measurement of one age.
     struct StartMotion {
         S time_s;
-        Mat2<S> noise;    ///< of the motion in that time
-        S fold_step_m;    ///< by how much farther a fold in range rate brings a target
-        S range_reach_m;  ///< how far off in range a partner may be at most, of this frame
+        Mat2<S> noise;  ///< of the motion in that time
+        S fold_step_m;  ///< by how much farther a fold in range rate brings a target
     };
     /// A pending measurement, and how often its range rate is folded.
     struct Start {
@@ -188,10 +189,13 @@ class Tracker {
         for (StartMotion& m : start_motion_) {
             p = predict_covariance(p, config_.motion);
             time_s += config_.motion.period_s;
-            m = {time_s, p, time_s * config_.gate.rate_span_mps, S(0)};
+            m = {time_s, p, time_s * config_.gate.rate_span_mps};
         }
     }
     [[nodiscard]] int age_of_pending(std::size_t i) const { return i < old_pending_count_ ? 2 : 1; }
+    [[nodiscard]] const StartMotion& motion_of(std::size_t pending) const {
+        return start_motion_[static_cast<std::size_t>(age_of_pending(pending)) - 1];
+    }
 
     static constexpr std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
 
@@ -216,13 +220,16 @@ class Tracker {
     void predict();
     [[nodiscard]] bool obscured(const Track<S>& track) const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
-                                       std::uint64_t usable, TrackerReport& report);
+                                       std::uint64_t usable, S range_variance, TrackerReport& report);
     static std::uint64_t claimed_by(std::span<const AssociationRow<S>> rows);
     void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S log_excess,
                          S& existence, std::span<const Measurement<S>> measurements);
     void update(Track<S>& track, const AssociationRow<S>& row, std::span<const Measurement<S>> measurements);
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
-    void consider_start(std::size_t from, const Vec2<S>& z, const Vec2<S>& noise, Start& best) const;
+    void consider_start(std::size_t from, S range_variance, const Vec2<S>& z, const Vec2<S>& noise,
+                        Start& best) const;
+    bool begin_track(const Start& start, const Measurement<S>& m, const Vec2<S>& noise,
+                     TrackerReport& report);
     [[nodiscard]] Mat2<S> start_covariance(const Vec2<S>& noise, const StartMotion& motion) const;
     /// The configured prior, its odds lowered as clutter is denser than expected; not so low as to be
     /// deleted.
@@ -233,8 +240,8 @@ class Tracker {
         const S least = config_.delete_existence * 2;
         return existence > least ? existence : least;
     }
+    Track<S>* weakest(bool confirmed);
     bool make_room_for_tentative(S snr_db, TrackerReport& report);
-    bool make_room_for_confirmed(S snr_db, TrackerReport& report);
     void confirm(TrackerReport& report);
     void merge(TrackerReport& report);
     void remove_lost(TrackerReport& report);
@@ -269,21 +276,22 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
         measurements = measurements.first(kMaxMeasurements);
     }
     std::uint64_t free = 0;
-    for (std::size_t i = 0; i < measurements.size(); ++i) {
-        if (usable(measurements[i])) {
-            free |= bit(i);
-        } else {
-            ++report.invalid_measurements;
-        }
-    }
+    S range_variance(0);
     index_.clear();
     for (std::size_t i = 0; i < measurements.size(); ++i) {
-        const bool use = (free & bit(i)) != 0;
-        index_.add(use ? measurements[i].z[1] : S(0), use ? measurements[i].variance[1] : S(0));
+        const Measurement<S>& m = measurements[i];
+        if (usable(m)) {
+            free |= bit(i);
+            if (m.variance[0] > range_variance) range_variance = m.variance[0];
+            index_.add(m.z[1], m.variance[1]);
+        } else {
+            ++report.invalid_measurements;
+            index_.add(S(0), S(0));
+        }
     }
     predict();
-    free &= ~associate_and_update(true, measurements, free, report);
-    free &= ~associate_and_update(false, measurements, free, report);
+    free &= ~associate_and_update(true, measurements, free, range_variance, report);
+    free &= ~associate_and_update(false, measurements, free, range_variance, report);
     remove_lost(report);
     start(measurements, free, report);
     confirm(report);
@@ -293,6 +301,7 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
 
 template <class S>
 void Tracker<S>::predict() {
+    const ProcessNoise<S> noise = process_noise(config_.motion);
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& t = track_[i];
         if (by_modes()) {
@@ -302,7 +311,7 @@ void Tracker<S>::predict() {
             t.covariance = all.covariance;
         } else {
             t.x = predict_state(t.x, config_.motion);
-            t.covariance = predict_covariance(t.covariance, config_.motion);
+            t.covariance = predict_covariance(t.covariance, config_.motion, noise);
         }
         t.existence *= config_.survival;
         if (t.age < 0xFFFF) ++t.age;
@@ -313,18 +322,20 @@ void Tracker<S>::predict() {
 template <class S>
 bool Tracker<S>::obscured(const Track<S>& track) const {
     for (const Track<S>& other : tracks()) {
-        if (!other.is_confirmed() || other.id == track.id) continue;
         const Vec2<S> d = gate_.innovation(track.x, other.x);
-        if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps)
+        if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps &&
+            other.is_confirmed() && other.id != track.id)
             return true;
     }
     return false;
 }
 
 /// Gates, associates and updates all confirmed or all tentative tracks. Returns the claimed measurements.
+/// `range_variance`: the largest of the measurements.
 template <class S>
 std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
-                                               std::uint64_t usable, TrackerReport& report) {
+                                               std::uint64_t usable, S range_variance,
+                                               TrackerReport& report) {
     std::array<S, kMaxConfirmed> existence;
     std::array<RankInput<S>, kHasExistence ? kMaxConfirmed : 0> rank;
     std::array<S, kHasExistence ? kMaxMeasurements : 0> strength;
@@ -337,10 +348,12 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
         const bool hidden = confirmed && obscured(t);
-        const S reach = gate_.rate_reach(t.covariance(1, 1), index_.largest_variance(), hidden);
+        const S rate_reach = gate_.rate_reach(t.covariance, index_.largest_variance(), hidden);
         gate_.fill(
-            row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], reach), hidden,
-            [&](const Vec2<S>& z) { return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z); });
+            row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], index_.width(rate_reach)),
+            hidden,
+            [&](const Vec2<S>& z) { return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z); },
+            gate_.range_reach(t.covariance, range_variance, hidden));
         S counted(0);
         if (config_.gate.nonparametric) {
             counted = gate_.log_counted_excess(row, t, measurements);
@@ -450,23 +463,25 @@ Mat2<S> Tracker<S>::start_covariance(const Vec2<S>& noise, const StartMotion& mo
 }
 
 /// Two measurements start a track if their range rates agree, and for one of the possible folds their range
-/// difference agrees with the range rate. Nearly all pairs fail on one of the two alone.
+/// difference agrees with the range rate. Nearly all pairs fail on one of the two alone. Not inlined: the
+/// loop around it turns most pairs away.
 template <class S>
-void Tracker<S>::consider_start(std::size_t from, const Vec2<S>& z, const Vec2<S>& noise, Start& best) const {
+[[gnu::noinline]] void Tracker<S>::consider_start(std::size_t from, S range_variance, const Vec2<S>& z,
+                                                  const Vec2<S>& noise, Start& best) const {
     const Pending& pending = pending_[from];
-    const StartMotion& motion = start_motion_[static_cast<std::size_t>(age_of_pending(from)) - 1];
+    const StartMotion& motion = motion_of(from);
     // The folded difference of the range rates is the same for every fold.
     const Vec2<S> change = gate_.innovation(pending.z, z);
+    const S travel = change[0] - motion.time_s * pending.z[1];
     const S rate_variance = pending.noise[1] + motion.noise(1, 1) + noise[1];
     if (product_exceeds(change[1], change[1], config_.gate.gate, rate_variance)) return;
-    const S travel = change[0] - motion.time_s * pending.z[1];
     const S span = config_.gate.rate_span_mps;
     const int folds = span > S(0) ? 1 : 0;
     for (int fold = -folds; fold <= folds; ++fold) {
         const Vec2<S> nu(
             fold == 0 ? travel : (fold > 0 ? travel - motion.fold_step_m : travel + motion.fold_step_m),
             change[1]);
-        if (absolute(nu[0]) > motion.range_reach_m) continue;
+        if (product_exceeds(nu[0], nu[0], config_.gate.gate, range_variance)) continue;
         const S rate = pending.z[1] + span * fold;
         if (rate < config_.min_start_rate_mps || rate > config_.max_start_rate_mps) continue;
         S distance2(0);
@@ -478,69 +493,95 @@ void Tracker<S>::consider_start(std::size_t from, const Vec2<S>& z, const Vec2<S
     }
 }
 
+/// A tentative track from a pending measurement and m; false where there is no room for it.
+template <class S>
+[[gnu::noinline]] bool Tracker<S>::begin_track(const Start& start, const Measurement<S>& m,
+                                               const Vec2<S>& noise, TrackerReport& report) {
+    const auto from = static_cast<std::size_t>(start.from);
+    const Pending& pending = pending_[from];
+    const StartMotion& motion = motion_of(from);
+    Track<S> track;
+    track.x[1] = pending.z[1] + config_.gate.rate_span_mps * start.fold;
+    track.x[0] = pending.z[0] - config_.gate.alias_range_m * start.fold + motion.time_s * track.x[1];
+    const Innovation<S> innovation(start_covariance(pending.noise, motion), noise);
+    const Vec2<S> move = innovation.move(gate_.innovation(track.x, m.z));
+    track.x[0] += move[0];
+    track.x[1] += move[1];
+    track.covariance = innovation.posterior();
+    if (!in_field(track) || !make_room_for_tentative(m.snr_db, report)) return false;
+    track.id = next_id();
+    track.state = TrackState::tentative;
+    track.existence = existence_of_start(clutter_.log_excess(m.z));
+    track.snr_db = m.snr_db;
+    track.age = static_cast<std::uint16_t>(age_of_pending(from));
+    track.hits = 2;
+    track.measured = true;
+    if constexpr (kHasModes) modes_[static_cast<std::size_t>(count_)].start(track.x, track.covariance);
+    track_[static_cast<std::size_t>(count_++)] = track;
+    ++report.initiated;
+    return true;
+}
+
 template <class S>
 void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
                        TrackerReport& report) {
+    index_.clear();
+    Scratch<S, kMaxMeasurements> expected;  // ranges of the pending measurements by now
+    S pending_variance(0);                  // the largest in range
+    S pending_rate(0);                      // the largest either way
+    for (std::size_t i = 0; i < pending_count_; ++i) {
+        const Pending& p = pending_[i];
+        index_.add(p.z[1], p.noise[1]);
+        expected[i] = p.z[0] + motion_of(i).time_s * p.z[1];
+        if (p.noise[0] > pending_variance) pending_variance = p.noise[0];
+        if (absolute(p.z[1]) > pending_rate) pending_rate = absolute(p.z[1]);
+    }
+    Vec2<S> variance = gate_.noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, false);  // the largest of this frame
+    for (const std::uint32_t index : Bits(unclaimed)) {
+        const Measurement<S>& m = measurements[index];
+        if (m.variance[0] > variance[0]) variance[0] = m.variance[0];
+        if (m.variance[1] > variance[1]) variance[1] = m.variance[1];
+    }
+    // Of the oldest pending measurements: the others are nearer.
+    const StartMotion& motion = start_motion_[kStartFrames - 1];
+    const S gate = config_.gate.gate;
+    const S rate_reach = sqrt_above(gate, S(index_.largest_variance() + motion.noise(1, 1) + variance[1]));
+    const std::uint32_t width = index_.width(rate_reach);
+    const S moved = motion.noise(0, 0) + motion.time_s * (motion.time_s * index_.largest_variance());
+    const S reach = sqrt_above(gate, S(pending_variance + variance[0] + moved)) + motion.fold_step_m;
+    // Range rates smaller than this are on the same side of a fold as all pending ones within reach; those of
+    // the others may make the expected range wrong.
+    const S unfolded = config_.gate.rate_span_mps - pending_rate - rate_reach;
+    const S folded_reach = reach + absolute(config_.gate.alias_range_m) * Gate<S>::kMaxFolds;
+
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
-    index_.clear();
-    S range_variance(0);  // the largest of two measurements together
-    for (const Pending& p : std::span(pending_).first(pending_count_)) {
-        index_.add(p.z[1], p.noise[1]);
-        range_variance = p.noise[0] > range_variance ? p.noise[0] : range_variance;
-    }
-    S largest(0);
-    for_each_bit(unclaimed, [&](std::uint32_t index) {
-        const S variance = gate_.noise(measurements[index], false)[0];
-        largest = variance > largest ? variance : largest;
-    });
-    range_variance += largest;
-    const S rate_variance = index_.largest_variance();
-    for (StartMotion& m : start_motion_) {
-        const S travelled = m.time_s * (m.time_s * rate_variance);
-        m.range_reach_m = sqrt_above(S(config_.gate.gate * S(range_variance + m.noise(0, 0) + travelled)));
-    }
-    const S most_change = rate_variance + start_motion_[kStartFrames - 1].noise(1, 1);
     int pairs = 0;
-    for_each_bit(unclaimed, [&](std::uint32_t index) {
+    for (const std::uint32_t index : Bits(unclaimed)) {
+        if (pairs >= kMaxStartPairs) {
+            ++report.not_paired;
+            continue;
+        }
         const Measurement<S>& m = measurements[index];
         const Vec2<S> noise = gate_.noise(m, false);
+        const S range = m.z[0];
+        const S own_variance = noise[0] + moved;
+        const bool folded = absolute(m.z[1]) >= unfolded;
+        const S most_off = folded ? folded_reach : reach;
         Start best;
-        const std::uint64_t near =
-            index_.near(m.z[1], gate_.rate_reach(most_change, noise[1], false)) & ~used;
-        pairs += std::popcount(near);
-        if (pairs > kMaxStartPairs) {
-            ++report.not_paired;
-            return;
+        for (const std::uint32_t from : Bits(index_.near(m.z[1], width) & ~used)) {
+            ++pairs;
+            const S off = absolute(range - expected[from]);
+            if (off > most_off) continue;
+            const S range_variance = own_variance + pending_[from].noise[0];
+            const auto too_far = [&](S d) { return product_exceeds(d, d, gate, range_variance); };
+            if (!folded && too_far(off) && too_far(off - motion_of(from).fold_step_m)) continue;
+            consider_start(from, range_variance, m.z, noise, best);
         }
-        for_each_bit(near, [&](std::uint32_t from) { consider_start(from, m.z, noise, best); });
-        if (best.from < 0) return;
-
-        const auto from = static_cast<std::size_t>(best.from);
-        const Pending& pending = pending_[from];
-        const StartMotion& motion = start_motion_[static_cast<std::size_t>(age_of_pending(from)) - 1];
-        Track<S> track;
-        track.x[1] = pending.z[1] + config_.gate.rate_span_mps * best.fold;
-        track.x[0] = pending.z[0] - config_.gate.alias_range_m * best.fold + motion.time_s * track.x[1];
-        const Innovation<S> innovation(start_covariance(pending.noise, motion), noise);
-        const Vec2<S> move = innovation.move(gate_.innovation(track.x, m.z));
-        track.x[0] += move[0];
-        track.x[1] += move[1];
-        track.covariance = innovation.posterior();
-        if (!in_field(track) || !make_room_for_tentative(m.snr_db, report)) return;
-        used |= bit(from);
+        if (best.from < 0 || !begin_track(best, m, noise, report)) continue;
+        used |= bit(static_cast<std::size_t>(best.from));
         left &= ~bit(index);
-        track.id = next_id();
-        track.state = TrackState::tentative;
-        track.existence = existence_of_start(clutter_.log_excess(m.z));
-        track.snr_db = m.snr_db;
-        track.age = static_cast<std::uint16_t>(age_of_pending(from));
-        track.hits = 2;
-        track.measured = true;
-        if constexpr (kHasModes) modes_[static_cast<std::size_t>(count_)].start(track.x, track.covariance);
-        track_[static_cast<std::size_t>(count_++)] = track;
-        ++report.initiated;
-    });
+    }
     remember(measurements, left, used);
 }
 
@@ -561,10 +602,19 @@ void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uin
         }
     }
     old_pending_count_ = kept;
-    for_each_bit(unclaimed, [&](std::uint32_t index) {
+    for (const std::uint32_t index : Bits(unclaimed))
         pending_[kept++] = {measurements[index].z, gate_.noise(measurements[index], false)};
-    });
     pending_count_ = kept;
+}
+
+/// Of the confirmed or the tentative tracks, of which there must be one.
+template <class S>
+Track<S>* Tracker<S>::weakest(bool confirmed) {
+    Track<S>* weakest = nullptr;
+    for (Track<S>& t : live()) {
+        if ((weakest == nullptr || t.snr_db < weakest->snr_db) && t.is_confirmed() == confirmed) weakest = &t;
+    }
+    return weakest;
 }
 
 /// With kMaxTentative already, the weakest gives way to a stronger one.
@@ -572,39 +622,33 @@ template <class S>
 bool Tracker<S>::make_room_for_tentative(S snr_db, TrackerReport& report) {
     if (count_of(false) < kMaxTentative) return true;
     ++report.dropped_for_capacity;
-    Track<S>* weakest = nullptr;
-    for (Track<S>& t : live()) {
-        if (!t.is_confirmed() && (weakest == nullptr || t.snr_db < weakest->snr_db)) weakest = &t;
-    }
-    if (snr_db <= weakest->snr_db) return false;
-    weakest->state = TrackState::free;
+    Track<S>* const t = weakest(false);
+    if (snr_db <= t->snr_db) return false;
+    t->state = TrackState::free;
     erase_free();
     return true;
 }
 
 /// With kMaxConfirmed already, the weakest gives way to one stronger by replace_margin_db.
 template <class S>
-bool Tracker<S>::make_room_for_confirmed(S snr_db, TrackerReport& report) {
-    if (count_of(true) < kMaxConfirmed) return true;
-    ++report.dropped_for_capacity;
-    Track<S>* weakest = nullptr;
-    for (Track<S>& t : live()) {
-        if (t.is_confirmed() && (weakest == nullptr || t.snr_db < weakest->snr_db)) weakest = &t;
-    }
-    if (snr_db < weakest->snr_db + config_.replace_margin_db) return false;
-    weakest->state = TrackState::free;
-    return true;
-}
-
-template <class S>
 void Tracker<S>::confirm(TrackerReport& report) {
+    int confirmed = count_of(true);
+    Track<S>* weakest_confirmed = nullptr;  // not looked for yet
     for (Track<S>& t : live()) {
         if (t.state != TrackState::tentative || t.hits < config_.confirm_hits ||
             t.existence < config_.confirm_existence || !t.measured) {
             continue;
         }
-        if (!make_room_for_confirmed(t.snr_db, report)) continue;
+        if (confirmed == kMaxConfirmed) {
+            ++report.dropped_for_capacity;
+            if (weakest_confirmed == nullptr) weakest_confirmed = weakest(true);
+            if (t.snr_db < weakest_confirmed->snr_db + config_.replace_margin_db) continue;
+            weakest_confirmed->state = TrackState::free;
+            --confirmed;
+        }
         t.state = TrackState::confirmed;
+        ++confirmed;
+        weakest_confirmed = nullptr;
         ++report.confirmed;
     }
     erase_free();
@@ -628,18 +672,27 @@ void Tracker<S>::merge(TrackerReport& report) {
         return accuracy.valid() && accuracy.distance2(d) < limit;
     };
     index_.clear();
-    for (const Track<S>& t : tracks()) index_.add(t.x[1], t.misses < kCoasting ? t.covariance(1, 1) : S(0));
-    const S reach = sqrt_above(S(limit * S(index_.largest_variance() + least[1])));
+    S range_variance(0);
+    for (const Track<S>& t : tracks()) {
+        const bool coasting = t.misses >= kCoasting;
+        index_.add(t.x[1], coasting ? S(0) : t.covariance(1, 1));
+        if (!coasting && t.covariance(0, 0) > range_variance) range_variance = t.covariance(0, 0);
+    }
+    const S range_reach = sqrt_above(limit, S(range_variance + least[0]));
+    const std::uint32_t width = index_.width(sqrt_above(limit, S(index_.largest_variance() + least[1])));
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& b = track_[i];
         bool same = false;
-        for_each_bit(index_.near(b.x[1], reach) & ~bit(i), [&](std::uint32_t j) {
+        for (const std::uint32_t j : Bits(index_.near(b.x[1], width) & ~bit(i))) {
             const Track<S>& a = track_[j];
-            if (same || a.state == TrackState::free || a.misses >= kCoasting) return;
+            if (absolute(a.x[0] - b.x[0]) > range_reach || a.state == TrackState::free ||
+                a.misses >= kCoasting)
+                continue;
             const bool yields =
                 a.is_confirmed() == b.is_confirmed() ? j < i || b.misses >= kCoasting : a.is_confirmed();
             same = yields && near(a, b);
-        });
+            if (same) break;
+        }
         b.overlap = same ? static_cast<std::uint8_t>(b.overlap + 1) : std::uint8_t{0};
         if (b.overlap < config_.merge_frames) continue;
         b.state = TrackState::free;
@@ -668,9 +721,7 @@ template <class S>
 std::uint8_t Tracker<S>::next_id() {
     for (int tries = 0; tries <= kMaxTracks; ++tries) {
         last_id_ = last_id_ == 255 ? std::uint8_t{1} : static_cast<std::uint8_t>(last_id_ + 1);
-        bool taken = false;
-        for (const Track<S>& t : tracks()) taken = taken || t.id == last_id_;
-        if (!taken) break;
+        if (!std::ranges::any_of(tracks(), [&](const Track<S>& t) { return t.id == last_id_; })) break;
     }
     return last_id_;
 }

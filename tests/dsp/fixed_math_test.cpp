@@ -81,6 +81,19 @@ TEST(FixedMath, DivisionStaysWithinItsBound) {
     CHECK(worst <= 1);
 }
 
+TEST(FixedMath, ShareOfAWholeIsTheProductBitForBit) {
+    std::mt19937 random(3);
+    for (int trial = 0; trial < 200'000; ++trial) {
+        const auto whole = static_cast<std::int32_t>(random() >> (1 + random() % 30) | 1U);
+        const auto part = static_cast<std::int32_t>(random() % (static_cast<std::uint32_t>(whole) + 1));
+        const dsp::Reciprocal<22> inverse(dsp::Real::from_raw(whole));
+        for (const std::int32_t p : {0, 1, part, whole - 1, whole}) {
+            const auto share = dsp::Real::from_raw(p);
+            LONGS_EQUAL((share * inverse).raw(), inverse.share(share).raw());
+        }
+    }
+}
+
 TEST(FixedMath, DivisionAtTheEndsOfTheFormat) {
     const auto lsb = Real::from_raw(1);
     CHECK(dsp::divide(Real(1), Real(0)) == Real::max());

@@ -1,6 +1,7 @@
 // Expected values worked by hand; the exhaustive cases are compared with exact integer arithmetic.
 #include <cstdint>
 #include <limits>
+#include <random>
 
 #include "dsp/fixed_point.hpp"
 #include "dsp/waveform.hpp"
@@ -24,6 +25,20 @@ TEST(FixedPoint, RoundShiftIsHalfToEvenAndUnbiased) {
     LONGS_EQUAL(0, bias);
     LONGS_EQUAL(std::numeric_limits<std::int32_t>::max() / 2 + 1,
                 dsp::round_shift(std::numeric_limits<std::int32_t>::max(), 1));
+}
+
+TEST(FixedPoint, ProductsAreRoundedAsRoundShiftDoes) {
+    std::mt19937 random(4);
+    for (int trial = 0; trial < 100'000; ++trial) {
+        // Of every size, and often a tie.
+        std::int64_t v =
+            dsp::product(static_cast<std::int32_t>(random()), static_cast<std::int32_t>(random()));
+        v >>= random() % 60;
+        if (trial % 2 == 0) v = v / (1 << 21) * (1 << 21);
+        const std::int64_t exact = dsp::round_shift(v, 22);
+        LONGS_EQUAL(dsp::saturate32(exact), dsp::narrowed<22>(v));
+        if (dsp::saturate32(exact) == exact) LONGS_EQUAL(exact, dsp::rounded<22>(v));
+    }
 }
 
 TEST(FixedPoint, RoundDivideMatchesExactComparison) {

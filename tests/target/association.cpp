@@ -130,9 +130,10 @@ void run_step(const Gate<Real>& gate, Associator associator, std::array<std::uin
     for (std::size_t t = 0; t < scene.tracks; ++t) existence[t] = track[t].existence;
 
     target::independent_ns();
+    const ProcessNoise<Real> noise = process_noise(kMotion);
     for (std::size_t t = 0; t < scene.tracks; ++t) {
         track[t].x = predict_state(track[t].x, kMotion);
-        track[t].covariance = predict_covariance(track[t].covariance, kMotion);
+        track[t].covariance = predict_covariance(track[t].covariance, kMotion, noise);
     }
     spent[predicting] += target::independent_ns();
     for (std::size_t t = 0; t < scene.tracks; ++t) {
@@ -240,6 +241,8 @@ bool arithmetic_agrees() {
             volatile std::int32_t right = operand(j);
             const std::int32_t a = left;
             const std::int32_t b = right;
+            const auto unsigned_a = static_cast<std::uint32_t>(a);
+            const auto unsigned_b = static_cast<std::uint32_t>(b);
             const std::int64_t wide_a = a;
             const std::int64_t wide_b = b;
             const std::int64_t sum = static_cast<std::int64_t>(std::uint64_t{next()} << 32 | next());
@@ -250,7 +253,11 @@ bool arithmetic_agrees() {
                 dsp::saturated_sum(a, b) != dsp::saturate32(wide_a + wide_b) ||
                 dsp::saturated_difference(a, b) != dsp::saturate32(wide_a - wide_b) ||
                 dsp::narrowed<22>(product) != dsp::saturate32(dsp::round_shift(product, 22)) ||
-                dsp::narrowed<30>(product) != dsp::saturate32(dsp::round_shift(product, 30)))
+                dsp::narrowed<30>(product) != dsp::saturate32(dsp::round_shift(product, 30)) ||
+                dsp::rounded<22>(product) != static_cast<std::int32_t>(dsp::round_shift(product, 22)) ||
+                dsp::detail::high_product(a, b) != static_cast<std::int32_t>(product >> 32) ||
+                dsp::detail::high_product(unsigned_a, unsigned_b) !=
+                    static_cast<std::uint32_t>(std::uint64_t{unsigned_a} * unsigned_b >> 32))
                 return false;
         }
     }

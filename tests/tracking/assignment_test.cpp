@@ -81,9 +81,14 @@ void best_and_proven() {
             for (const auto& item : rows[t].candidates())
                 CHECK(item.beta <= best.row_price[t] + best.measurement_price[item.measurement]);
         }
-        for (std::size_t j = 0; j < tracking::kMaxMeasurements; ++j) {
-            CHECK(best.measurement_price[j] >= S(0));
-            if ((used >> j & 1) == 0) CHECK(best.measurement_price[j] == S(0));
+        for (const auto& row : rows) {
+            for (const auto& item : row.candidates()) {
+                const std::size_t j = item.measurement;
+                CHECK(best.measurement_price[j] >= S(0));
+                if ((used >> j & 1) != 0) continue;
+                CHECK(best.measurement_price[j] == S(0));
+                LONGS_EQUAL(Assignment<S>::kNone, best.owner[j]);
+            }
         }
         CHECK(total == best_of_all(rows, 0, 0));
     }

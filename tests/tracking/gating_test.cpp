@@ -128,6 +128,48 @@ TEST(Gating, FoldedRangeRatesAreUnfoldedTowardsTheTrackAndTheRangeWithThem) {
         100, value(Gate<Real>(unambiguous).innovation({Real(80), Real(-40)}, {Real(80), Real(60)})[1]), 0);
 }
 
+TEST(Gating, ReachInRangeTurnsAwayNothingOfTheGate) {
+    const Gate<Real> gate{GateConfig<Real>{}};
+    std::mt19937 random(5);
+    const auto centi = [&](int from, int to) {
+        return constant<Real>(from + static_cast<int>(random() % static_cast<unsigned>(to - from)), 100);
+    };
+    int gated = 0;
+    int folded = 0;
+    for (int trial = 0; trial < 3000; ++trial) {
+        const bool obscured = trial % 3 == 0;
+        const Vec2<Real> x(Real(60), centi(-8000, 4500));
+        Mat2<Real> p = covariance<Real>();
+        p(0, 0) = centi(10, 10'000);
+        std::vector<Measurement<Real>> measurements;
+        Real variance(0);
+        for (int i = 0; i < 12; ++i) {
+            auto m = at<Real>(centi(2000, 10'000), Real(0));
+            const int fold = static_cast<int>(random() % 3) - 1;
+            m.z[1] = x[1] + centi(-60, 60) + gate.config().rate_span_mps * fold;
+            m.variance[0] = centi(1, 200);
+            variance = std::max(variance, m.variance[0]);
+            measurements.push_back(m);
+        }
+        AssociationRow<Real> all;
+        AssociationRow<Real> near;
+        gate.fill(all, x, p, measurements, kAll, obscured);
+        gate.fill(
+            near, x, p, measurements, kAll, obscured, [](const Vec2<Real>&) { return Real(0); },
+            gate.range_reach(p, variance, obscured));
+        LONGS_EQUAL(all.count, near.count);
+        for (int i = 0; i < all.count; ++i) {
+            const auto& c = near.item[static_cast<std::size_t>(i)];
+            LONGS_EQUAL(all.item[static_cast<std::size_t>(i)].measurement, c.measurement);
+            const auto& m = measurements[c.measurement];
+            if (tracking::absolute(Real(m.z[1] - x[1])) > Real(10)) ++folded;
+            ++gated;
+        }
+    }
+    CHECK(gated > 5000);
+    CHECK(folded > 1000);
+}
+
 TEST(Gating, CertaintiesStayFinite) {
     GateConfig<Real> config;
     config.detection_probability = Real(1);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "tests/tracking/scalars.hpp"
 #include "tracking/kalman.hpp"
 
 #include <CppUTest/TestHarness.h>
@@ -17,22 +18,10 @@ using tracking::Ldl;
 using tracking::Mat2;
 using tracking::MotionModel;
 using tracking::Vec2;
+using tracking_test::scalar;
+using tracking_test::value;
 
 namespace {
-double value(double v) {
-    return v;
-}
-double value(Real v) {
-    return std::ldexp(v.raw(), -22);
-}
-template <class S>
-S scalar(double v) {
-    if constexpr (std::floating_point<S>) {
-        return v;
-    } else {
-        return Real::from_raw(static_cast<std::int32_t>(std::lround(v * (1 << 22))));
-    }
-}
 template <class S>
 Mat2<S> scalars(const Eigen::Matrix2d& m) {
     Mat2<S> out;

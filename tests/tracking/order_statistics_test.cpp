@@ -135,7 +135,7 @@ TEST(OrderStatistics, OptimalPrecedenceIsTheBestAssignmentOfAll) {
                 if (!more) choice[t] = 0;
             }
         }
-        tracking::detail::Dominants dominants;
+        tracking::Assignment<double> dominants;
         tracking::detail::choose_optimally<double>(rows, dominants);
         double value = 0;
         for (std::size_t t = 0; t < tracks; ++t) {

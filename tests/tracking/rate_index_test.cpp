@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/tracking/scalars.hpp"
 #include "tracking/rate_index.hpp"
 
 #include <CppUTest/TestHarness.h>
@@ -12,23 +13,10 @@
 using dsp::Real;
 using tracking::kMaxMeasurements;
 using tracking::RateIndex;
+using tracking_test::scalar;
+using tracking_test::value;
 
 namespace {
-double value(double v) {
-    return v;
-}
-double value(Real v) {
-    return std::ldexp(v.raw(), -22);
-}
-template <class S>
-S scalar(double v) {
-    if constexpr (std::floating_point<S>) {
-        return v;
-    } else {
-        return Real::from_raw(static_cast<std::int32_t>(std::lround(std::ldexp(v, 22))));
-    }
-}
-
 template <class S>
 void finds_all_and_little_else(double span) {
     std::mt19937 random(1);
@@ -39,7 +27,7 @@ void finds_all_and_little_else(double span) {
     int found = 0;
     for (int trial = 0; trial < 2000; ++trial) {
         index.clear();
-        CHECK_EQUAL(0, index.near(S(0), S(500)));
+        CHECK_EQUAL(0, index.near(S(0), index.width(S(500))));
         std::vector<double> rates(1 + random() % kMaxMeasurements);
         double largest = 0;
         for (double& r : rates) {
@@ -52,7 +40,7 @@ void finds_all_and_little_else(double span) {
         DOUBLES_EQUAL(largest, value(index.largest_variance()), 1e-6);
         const S middle = scalar<S>(rate(random));
         const S reach = scalar<S>(std::pow(10, size(random)));
-        const std::uint64_t near = index.near(middle, reach);
+        const std::uint64_t near = index.near(middle, index.width(reach));
         for (std::size_t i = 0; i < 64; ++i) {
             const bool is_near = (near >> i & 1) != 0;
             if (i >= rates.size()) {
@@ -85,6 +73,6 @@ TEST(RateIndex, EverythingIsNearWithoutASpan) {
     for (const double span : {0.0, 0.5}) {
         RateIndex<Real> index(scalar<Real>(span));
         for (int i = 0; i < kMaxMeasurements; ++i) index.add(Real(i - 30), Real(1));
-        CHECK(index.near(Real(400), Real(0)) == ~std::uint64_t{0});
+        CHECK(index.near(Real(400), index.width(Real(0))) == ~std::uint64_t{0});
     }
 }

@@ -1,4 +1,5 @@
 // Expected values: long double, whose 64 digits hold every product of two numbers of 32 bits.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -27,24 +28,28 @@ std::vector<std::int32_t> operands() {
 TEST_GROUP(Scalar){};
 
 TEST(Scalar, SquareRootAboveIsAboveAndNear) {
-    CHECK(sqrt_above(Real(-1)) == Real(0));
-    CHECK(sqrt_above(Real(0)) == Real(0));
+    CHECK(sqrt_above(Real(16), Real::from_raw(-1)) == Real(0));
+    CHECK(sqrt_above(Real(1), Real(-1)) == Real(0));
     std::mt19937 random(2);
-    const auto check = [](std::int32_t raw) {
-        const double root = std::sqrt(std::ldexp(raw, -22));
-        const double above = std::ldexp(sqrt_above(Real::from_raw(raw)).raw(), -22);
+    const auto check = [](std::int32_t a, std::int32_t b) {
+        const double root = std::sqrt(std::ldexp(a, -22)) * std::sqrt(std::ldexp(b, -22));
+        const double above = std::ldexp(sqrt_above(Real::from_raw(a), Real::from_raw(b)).raw(), -22);
         CHECK(above >= root);
-        CHECK(above <= 1.07 * root + std::ldexp(3, -22));
+        CHECK(above <= std::max(1.07 * root, root + std::ldexp((1 << 15) + 2, -22)));
     };
-    for (std::int32_t raw = 1; raw < 10'000; ++raw) check(raw);
-    for (int bit = 1; bit < 31; ++bit) {
-        check((1 << bit) - 1);
-        check(1 << bit);
-        check((1 << bit) + 1);
+    constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
+    for (const std::int32_t other : {0, 1, 1 << 22, 1 << 26, kMax}) {
+        for (std::int32_t raw = 1; raw < 10'000; ++raw) check(raw, other);
+        for (int bit = 1; bit < 31; ++bit) {
+            check((1 << bit) - 1, other);
+            check(1 << bit, other);
+            check((1 << bit) + 1, other);
+        }
+        check(kMax, other);
     }
-    for (int i = 0; i < 100'000; ++i) check(static_cast<std::int32_t>(random() >> 1) >> random() % 31 | 1);
-    check(std::numeric_limits<std::int32_t>::max());
-    for (const double x : {0.0, 1e-300, 2.0, 1e300}) CHECK(sqrt_above(x) * sqrt_above(x) >= x);
+    const auto of_any_size = [&] { return static_cast<std::int32_t>(random() >> 1) >> random() % 31 | 1; };
+    for (int i = 0; i < 100'000; ++i) check(of_any_size(), of_any_size());
+    for (const double x : {0.0, 1e-300, 2.0, 1e300}) CHECK(sqrt_above(x, 1.0) * sqrt_above(1.0, x) >= x);
 }
 
 TEST(Scalar, ProductsAreComparedExactly) {

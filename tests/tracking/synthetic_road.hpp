@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/tracking/scalars.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking_test {
@@ -157,13 +158,6 @@ std::vector<tracking::Measurement<S>> as(const std::vector<tracking::Measurement
         out.push_back(o);
     }
     return out;
-}
-
-inline double value(double v) {
-    return v;
-}
-inline double value(dsp::Real v) {
-    return std::ldexp(v.raw(), -22);
 }
 
 }  // namespace tracking_test

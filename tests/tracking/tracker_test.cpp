@@ -5,9 +5,12 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <random>
 #include <set>
 #include <span>
 #include <vector>
+
+#include <Eigen/Dense>
 
 #include "tests/tracking/synthetic_road.hpp"
 #include "tracking/tracker.hpp"
@@ -297,6 +300,104 @@ TEST(Tracker, IdsAreNotGivenAgainUntilAllOthersWere) {
     LONGS_EQUAL(300, ids.size());
     for (std::size_t i = 0; i < 254; ++i) LONGS_EQUAL(2 + i, ids[i]);
     LONGS_EQUAL(2, ids[254]);  // round again, past the one still in use
+}
+
+TEST(Tracker, StartsAreThePairsThatListingThemFinds) {
+    const TrackerConfig<double> config;
+    const tracking::Gate<double> gate(config.gate);
+    const double span = config.gate.rate_span_mps;
+    const double period = config.motion.period_s;
+    const tracking::ProcessNoise<double> q = tracking::process_noise(config.motion);
+    std::mt19937 random(6);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    const auto measured = [&](double range, double rate) {
+        Measurement<double> m;
+        m.z = {range, std::remainder(rate, span)};
+        m.variance = {0.02 * std::pow(50, std::abs(uniform(random))), 0.005};
+        return m;
+    };
+    int started = 0;
+    int folded = 0;
+    for (int trial = 0; trial < 2000; ++trial) {
+        std::vector<Measurement<double>> first, second;
+        for (int i = 0; i < 12; ++i) {
+            const double range = 80 + 60 * uniform(random);
+            const double rate = -18 + 60 * uniform(random);
+            // The signal processing has taken the coupling of the folded range rate out of the range.
+            const double coupling =
+                std::round((rate - std::remainder(rate, span)) / span) * config.gate.alias_range_m;
+            first.push_back(measured(range + coupling, rate));
+            second.push_back(
+                measured(range + coupling + period * rate + uniform(random), rate + 1.5 * uniform(random)));
+        }
+        std::set<std::size_t> used;
+        std::vector<double> expected;
+        for (const auto& m : second) {
+            double smallest = config.gate.gate;
+            std::size_t best = first.size();
+            double predicted = 0;
+            int best_fold = 0;
+            for (std::size_t j = 0; j < first.size(); ++j) {
+                if (used.contains(j)) continue;
+                const auto r0 = gate.noise(first[j], false);
+                const auto r1 = gate.noise(m, false);
+                Eigen::Matrix2d s;
+                s << q.range + r0[0] + period * period * r0[1] + r1[0], q.cross + period * r0[1],
+                    q.cross + period * r0[1], q.rate + r0[1] + r1[1];
+                for (int fold = -1; fold <= 1; ++fold) {
+                    const double rate = first[j].z[1] + fold * span;
+                    if (rate < config.min_start_rate_mps || rate > config.max_start_rate_mps) continue;
+                    const double range = first[j].z[0] - fold * config.gate.alias_range_m + period * rate;
+                    // The measurement unfolded towards that rate.
+                    const double folds = std::round((rate - m.z[1]) / span);
+                    const Eigen::Vector2d nu(m.z[0] - folds * config.gate.alias_range_m - range,
+                                             m.z[1] + folds * span - rate);
+                    double distance = nu.dot(s.inverse() * nu);
+                    if (distance > config.gate.gate) continue;
+                    distance += fold == 0 ? 0 : config.fold_distance2;
+                    if (distance > config.gate.gate || (best < first.size() && distance >= smallest))
+                        continue;
+                    smallest = distance;
+                    best = j;
+                    best_fold = fold;
+                    predicted = rate;
+                }
+            }
+            if (best == first.size()) continue;
+            used.insert(best);
+            expected.push_back(predicted);
+            folded += best_fold == 0 ? 0 : 1;
+        }
+        Tracker<double> tracker{config};
+        tracker.step(first);
+        tracker.step(second);
+        LONGS_EQUAL(expected.size(), tracker.tracks().size());
+        for (std::size_t i = 0; i < expected.size(); ++i)
+            DOUBLES_EQUAL(expected[i], tracker.tracks()[i].x[1], 3);
+        started += static_cast<int>(expected.size());
+    }
+    CHECK(started > 10'000);
+    CHECK(folded > 1000);
+}
+
+TEST(Tracker, OnlySoManyPairsAreLookedAtToStartTracks) {
+    // A road where everything has nearly one range rate: every measurement might go with every other, and
+    // none does. Of the 64, 16 have been compared with 64 when the limit is reached.
+    Tracker<Real> tracker{TrackerConfig<Real>{}};
+    std::vector<Measurement<Real>> first, second;
+    for (int i = 0; i < tracking::kMaxMeasurements; ++i) {
+        first.push_back(at<Real>(1000 + 200 * i, 0));
+        second.push_back(at<Real>(1000 + 200 * i, 240));
+    }
+    LONGS_EQUAL(0, tracker.step(first).not_paired);
+    const auto report = tracker.step(second);
+    LONGS_EQUAL(tracking::kMaxMeasurements - tracking::kMaxStartPairs / tracking::kMaxMeasurements,
+                report.not_paired);
+    LONGS_EQUAL(0, report.initiated);
+    // Those not looked at wait like the others: the next frame begins with the strongest again.
+    const auto next = tracker.step(second);
+    CHECK(next.initiated > 0);
+    CHECK(next.not_paired > 0);
 }
 
 TEST(Tracker, OverCapacityKeepsTheStrongestAndCounts) {
