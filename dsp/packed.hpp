@@ -134,6 +134,30 @@ constexpr std::int32_t scale_0(std::int32_t a, Pair b) {
 constexpr std::int32_t scale_1(std::int32_t a, Pair b) {
     return static_cast<std::int32_t>(product(a, lane1(b)) >> 16);
 }
+constexpr Pair floored_sub(Pair a, Pair b) {
+    const auto lane = [](Pair x, Pair y) { return x > y ? x - y : 0U; };
+    return lane(a & 0xFFFFU, b & 0xFFFFU) | lane(a >> 16, b >> 16) << 16;
+}
+constexpr void sort(Pair& a, Pair& b) {
+    const Pair low = smallest(a, b);
+    b = largest(a, b);
+    a = low;
+}
+constexpr std::uint32_t left_aligned(std::uint32_t v, int zeros) {
+    return zeros < 32 ? v << zeros : 0;
+}
+template <class T>
+void load_pair(const T* from, Pair& first, Pair& second) {
+    static_assert(4 % sizeof(T) == 0);
+    std::memcpy(&first, from, sizeof first);
+    std::memcpy(&second, from + sizeof first / sizeof(T), sizeof second);
+}
+template <class T>
+void store_pair(T* to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    std::memcpy(static_cast<void*>(to), &first, sizeof first);
+    std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
+}
 }  // namespace portable
 
 #if DSP_PACKED_INTRINSICS
@@ -242,6 +266,37 @@ inline std::int32_t scale_0(std::int32_t a, Pair b) {
 }
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
     return __smlawt(a, static_cast<std::int32_t>(b), 0);
+}
+/// a - b lane by lane, both unsigned, not below zero
+inline Pair floored_sub(Pair a, Pair b) {
+    return __uqsub16(a, b);
+}
+/// The smaller of the two numbers of each lane to a, the larger to b: one comparison for both.
+inline void sort(Pair& a, Pair& b) {
+    (void)__ssub16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b));
+    const Pair low = __sel(b, a);
+    b = __sel(a, b);
+    a = low;
+}
+/// v times 2^zeros, 0..32: by all 32 too, which a shift in C++ must not.
+inline std::uint32_t left_aligned(std::uint32_t v, int zeros) {
+    std::uint32_t result;
+    asm("lsl %0, %1, %2" : "=r"(result) : "r"(v), "r"(zeros));
+    return result;
+}
+/// Two words next to each other, aligned to four bytes, with one instruction. The compiler takes it for words
+/// aligned to eight only.
+template <class T>
+void load_pair(const T* from, Pair& first, Pair& second) {
+    static_assert(4 % sizeof(T) == 0);
+    using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
+    asm("ldrd %0, %1, %2" : "=r"(first), "=r"(second) : "o"(*reinterpret_cast<const Words*>(from)));
+}
+template <class T>
+void store_pair(T* to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
+    asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
 }
 /// Clamped to 16 bits.
 inline std::int32_t clamp(std::int32_t v) {

@@ -52,6 +52,13 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     lanes(std::max(a0, b0), std::max(a1, b1), largest(a, b));
     lanes(std::min(a0, b0), std::min(a1, b1), smallest(a, b));
     lanes(a1, a0, swap(a));
+    Pair smaller = a;
+    Pair larger = b;
+    sort(smaller, larger);
+    lanes(std::min(a0, b0), std::min(a1, b1), smaller);
+    lanes(std::max(a0, b0), std::max(a1, b1), larger);
+    const auto above = [](int x, int y) { return wrap16(std::max((x & 0xFFFF) - (y & 0xFFFF), 0)); };
+    lanes(above(a0, b0), above(a1, b1), floored_sub(a, b));
     const auto product = [](std::int64_t x, std::int64_t y) { return x * y; };
     LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1) + sum), dot(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b0) - product(a1, b1) + sum), dot_minus(a, b, sum));
@@ -88,6 +95,24 @@ TEST(Packed, RandomNumbers) {
         check(draw(), draw(), draw(), draw(),
               static_cast<std::int32_t>(static_cast<std::uint32_t>(random())));
     }
+}
+
+TEST(Packed, LeftAlignedShiftsByAllBitsToo) {
+    for (int zeros = 0; zeros < 32; ++zeros) {
+        UNSIGNED_LONGS_EQUAL(0x80000001U << zeros, left_aligned(0x80000001U, zeros));
+    }
+    UNSIGNED_LONGS_EQUAL(0, left_aligned(0xFFFFFFFFU, 32));
+}
+
+TEST(Packed, TwoWordsGoThroughMemory) {
+    alignas(4) std::array<std::int16_t, 6> samples{1, -2, 3, -4, 5, -6};
+    Pair first = 0;
+    Pair second = 0;
+    load_pair(&samples[2], first, second);
+    lanes(3, -4, first);
+    lanes(5, -6, second);
+    store_pair(samples.data(), second, first);
+    CHECK((samples == std::array<std::int16_t, 6>{5, -6, 3, -4, 5, -6}));
 }
 
 TEST(Packed, MagnitudeBitsCoverEveryValue) {
