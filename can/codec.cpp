@@ -1,5 +1,6 @@
 #include "can/codec.hpp"
 
+#include <bit>
 #include <concepts>
 #include <cstdint>
 #include <type_traits>
@@ -47,8 +48,8 @@ class Packer {
     void limited() { encoded_.limited = true; }
 
     Encoded finish() {
-        for (unsigned i = 0; i < encoded_.frame.data.size(); ++i)
-            encoded_.frame.data[i] = static_cast<std::uint8_t>(word_ >> (8 * i));
+        static_assert(std::endian::native == std::endian::little);
+        encoded_.frame.data = std::bit_cast<decltype(encoded_.frame.data)>(word_);
         return encoded_;
     }
 
