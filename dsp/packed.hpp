@@ -158,6 +158,22 @@ void store_pair(T* to, Pair first, Pair second) {
     std::memcpy(static_cast<void*>(to), &first, sizeof first);
     std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
 }
+template <class T>
+void load_four(const T* from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    load_pair(from, a, b);
+    load_pair(from + 2 * sizeof a / sizeof(T), c, d);
+}
+template <class T>
+void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    load_four(from, a, b, c, d);
+    from += 4 * sizeof a / sizeof(T);
+}
+template <class T>
+void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
+    store_pair(to, a, b);
+    store_pair(to + 2 * sizeof a / sizeof(T), c, d);
+    to += 4 * sizeof a / sizeof(T);
+}
 }  // namespace portable
 
 #if DSP_PACKED_INTRINSICS
@@ -262,10 +278,14 @@ inline std::int32_t multiply_10(Pair a, Pair b, std::int32_t sum) {
 }
 /// a times a lane of b, its upper 32 of 48 bits, rounded down
 inline std::int32_t scale_0(std::int32_t a, Pair b) {
-    return __smlawb(a, static_cast<std::int32_t>(b), 0);
+    std::int32_t result;
+    asm("smulwb %0, %1, %2" : "=r"(result) : "r"(a), "r"(b));
+    return result;
 }
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
-    return __smlawt(a, static_cast<std::int32_t>(b), 0);
+    std::int32_t result;
+    asm("smulwt %0, %1, %2" : "=r"(result) : "r"(a), "r"(b));
+    return result;
 }
 /// a - b lane by lane, both unsigned, not below zero
 inline Pair floored_sub(Pair a, Pair b) {
@@ -297,6 +317,52 @@ void store_pair(T* to, Pair first, Pair second) {
     static_assert(4 % sizeof(T) == 0);
     using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
     asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
+}
+/// Four words next to each other; take_four and put_four leave the pointer behind them. One instruction,
+/// which wants its registers in order.
+template <class T>
+void load_four(const T* from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r3");
+    register Pair b_in asm("r4");
+    register Pair c_in asm("r5");
+    register Pair d_in asm("r6");
+    asm volatile("ldmia %4, {%0, %1, %2, %3}"
+                 : "=r"(a_in), "=r"(b_in), "=r"(c_in), "=r"(d_in)
+                 : "r"(from)
+                 : "memory");
+    a = a_in;
+    b = b_in;
+    c = c_in;
+    d = d_in;
+}
+template <class T>
+void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r3");
+    register Pair b_in asm("r4");
+    register Pair c_in asm("r5");
+    register Pair d_in asm("r6");
+    asm volatile("ldmia %4!, {%0, %1, %2, %3}"
+                 : "=r"(a_in), "=r"(b_in), "=r"(c_in), "=r"(d_in), "+r"(from)
+                 :
+                 : "memory");
+    a = a_in;
+    b = b_in;
+    c = c_in;
+    d = d_in;
+}
+template <class T>
+void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r3") = a;
+    register Pair b_in asm("r4") = b;
+    register Pair c_in asm("r5") = c;
+    register Pair d_in asm("r6") = d;
+    asm volatile("stmia %0!, {%1, %2, %3, %4}"
+                 : "+r"(to)
+                 : "r"(a_in), "r"(b_in), "r"(c_in), "r"(d_in)
+                 : "memory");
 }
 /// Clamped to 16 bits.
 inline std::int32_t clamp(std::int32_t v) {

@@ -28,13 +28,14 @@ int guard_bits(const Window& window) {
 /// Of all numbers of a row.
 int magnitude_bits(const Complex16* row) {
     Pair spreads = 0;
-    unrolled<kChirps, 2, 8>([row, &spreads](std::size_t k) {
-        Pair x = 0;
-        Pair y = 0;
-        packed::load_pair(&row[k], x, y);
-        spreads |= packed::spread(x);
-        spreads |= packed::spread(y);
-    });
+    for (const Complex16* const end = row + kChirps; row != end;) {
+        Pair a = 0;
+        Pair b = 0;
+        Pair c = 0;
+        Pair d = 0;
+        packed::take_four(row, a, b, c, d);
+        spreads |= packed::spread(a) | packed::spread(b) | packed::spread(c) | packed::spread(d);
+    }
     return packed::magnitude_bits(spreads);
 }
 
@@ -60,36 +61,39 @@ Pair product(Pair x, std::int32_t weight) {
 }
 
 template <bool kUpperHalf>
-void scale_two(Complex16* row, const std::int32_t* weight, int shift) {
-    Pair x = 0;
-    Pair y = 0;
-    Pair v = 0;
-    Pair w = 0;
-    packed::load_pair(row, x, y);
-    packed::load_pair(weight, v, w);
-    packed::store_pair(row, product<kUpperHalf>(x, static_cast<std::int32_t>(v) >> shift),
-                       product<kUpperHalf>(y, static_cast<std::int32_t>(w) >> shift));
+inline void scale_four(Complex16*& row, const std::int32_t*& weight, int shift) {
+    Pair a = 0;
+    Pair b = 0;
+    Pair c = 0;
+    Pair d = 0;
+    packed::take_four(weight, a, b, c, d);
+    const std::int32_t wa = static_cast<std::int32_t>(a) >> shift;
+    const std::int32_t wb = static_cast<std::int32_t>(b) >> shift;
+    const std::int32_t wc = static_cast<std::int32_t>(c) >> shift;
+    const std::int32_t wd = static_cast<std::int32_t>(d) >> shift;
+    packed::load_four(row, a, b, c, d);
+    packed::put_four(row, product<kUpperHalf>(a, wa), product<kUpperHalf>(b, wb), product<kUpperHalf>(c, wc),
+                     product<kUpperHalf>(d, wd));
 }
 
 /// row[k] = row[k] * weight[k] / 2^(shift + 16), or / 2^shift from the upper half of a product, rounded down.
-/// Not by unrolled(): what a lambda captures stays in memory beside packed::store_pair.
 template <bool kUpperHalf>
 void scale(Complex16* row, const std::int32_t* weight, int shift) {
-    for (const Complex16* const end = row + kChirps; row != end; row += 8, weight += 8) {
-        scale_two<kUpperHalf>(row, weight, shift);
-        scale_two<kUpperHalf>(row + 2, weight + 2, shift);
-        scale_two<kUpperHalf>(row + 4, weight + 4, shift);
-        scale_two<kUpperHalf>(row + 6, weight + 6, shift);
+    for (const Complex16* const end = row + kChirps; row != end;) {
+        scale_four<kUpperHalf>(row, weight, shift);
+        scale_four<kUpperHalf>(row, weight, shift);
     }
 }
 
-inline Pair log_power_of_two(const Complex16* from, Pair bias) {
-    Pair x = 0;
-    Pair y = 0;
-    packed::load_pair(from, x, y);
-    // Squares are at most 2^31.
-    return log2_coarse_q10(static_cast<std::uint32_t>(packed::dot(x, x, 0)),
-                           static_cast<std::uint32_t>(packed::dot(y, y, 0)), bias);
+inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t* to) {
+    Pair a = 0;
+    Pair b = 0;
+    Pair c = 0;
+    Pair d = 0;
+    packed::take_four(from, a, b, c, d);
+    const auto square = [](Pair x) { return static_cast<std::uint32_t>(packed::dot(x, x, 0)); };  // <= 2^31
+    const Pair first = log2_coarse_q10(square(a), square(b), bias);
+    packed::store_pair(to, first, log2_coarse_q10(square(c), square(d), bias));
 }
 
 }  // namespace
@@ -152,11 +156,9 @@ void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
     const Pair bias = log2_bias(2 * exponent * kLogOne);
     const Complex16* from = row.data();
     std::uint16_t* to = power.data();
-    for (const Complex16* const end = from + kDopplerCells; from != end; from += 8, to += 8) {
-        const Pair first = log_power_of_two(from, bias);
-        packed::store_pair(to, first, log_power_of_two(from + 2, bias));
-        const Pair third = log_power_of_two(from + 4, bias);
-        packed::store_pair(to + 4, third, log_power_of_two(from + 6, bias));
+    for (const Complex16* const end = from + kDopplerCells; from != end; to += 8) {
+        log_power_of_four(from, bias, to);
+        log_power_of_four(from, bias, to + 4);
     }
 }
 

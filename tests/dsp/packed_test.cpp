@@ -115,6 +115,25 @@ TEST(Packed, TwoWordsGoThroughMemory) {
     CHECK((samples == std::array<std::int16_t, 6>{5, -6, 3, -4, 5, -6}));
 }
 
+TEST(Packed, FourWordsGoThroughMemory) {
+    std::array<std::uint32_t, 9> words{1, 2, 3, 4, 5, 6, 7, 8, 9};
+    Pair a = 0;
+    Pair b = 0;
+    Pair c = 0;
+    Pair d = 0;
+    const std::uint32_t* from = &words[0];
+    take_four(from, a, b, c, d);
+    POINTERS_EQUAL(&words[4], from);
+    CHECK(a == 1 && b == 2 && c == 3 && d == 4);
+    load_four(from, a, b, c, d);
+    POINTERS_EQUAL(&words[4], from);
+    CHECK(a == 5 && b == 6 && c == 7 && d == 8);
+    std::uint32_t* to = &words[1];
+    put_four(to, d, c, b, a);
+    POINTERS_EQUAL(&words[5], to);
+    CHECK((words == std::array<std::uint32_t, 9>{1, 8, 7, 6, 5, 6, 7, 8, 9}));
+}
+
 TEST(Packed, MagnitudeBitsCoverEveryValue) {
     for (int v = -32768; v <= 32767; ++v) {
         int bits = 1;
