@@ -3,6 +3,7 @@
 /// Complex16.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -153,12 +154,6 @@ void load_pair(const T* from, Pair& first, Pair& second) {
     std::memcpy(&second, from + sizeof first / sizeof(T), sizeof second);
 }
 template <class T>
-void store_pair(T* to, Pair first, Pair second) {
-    static_assert(4 % sizeof(T) == 0);
-    std::memcpy(static_cast<void*>(to), &first, sizeof first);
-    std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
-}
-template <class T>
 void load_four(const T* from, Pair& a, Pair& b, Pair& c, Pair& d) {
     load_pair(from, a, b);
     load_pair(from + 2 * sizeof a / sizeof(T), c, d);
@@ -170,9 +165,15 @@ void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
 }
 template <class T>
 void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
-    store_pair(to, a, b);
-    store_pair(to + 2 * sizeof a / sizeof(T), c, d);
-    to += 4 * sizeof a / sizeof(T);
+    const std::array<Pair, 4> words{a, b, c, d};
+    std::memcpy(static_cast<void*>(to), words.data(), sizeof words);
+    to += sizeof words / sizeof(T);
+}
+template <class T>
+void store_pair(T* to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    std::memcpy(static_cast<void*>(to), &first, sizeof first);
+    std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
 }
 }  // namespace portable
 
@@ -312,12 +313,6 @@ void load_pair(const T* from, Pair& first, Pair& second) {
     using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
     asm("ldrd %0, %1, %2" : "=r"(first), "=r"(second) : "o"(*reinterpret_cast<const Words*>(from)));
 }
-template <class T>
-void store_pair(T* to, Pair first, Pair second) {
-    static_assert(4 % sizeof(T) == 0);
-    using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
-    asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
-}
 /// Four words next to each other; take_four and put_four leave the pointer behind them. One instruction,
 /// which wants its registers in order.
 template <class T>
@@ -363,6 +358,13 @@ void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
                  : "+r"(to)
                  : "r"(a_in), "r"(b_in), "r"(c_in), "r"(d_in)
                  : "memory");
+}
+/// Two words, as load_pair.
+template <class T>
+void store_pair(T* to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
+    asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
 }
 /// Clamped to 16 bits.
 inline std::int32_t clamp(std::int32_t v) {
