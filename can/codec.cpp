@@ -1,7 +1,10 @@
 #include "can/codec.hpp"
 
+#include <bit>
 #include <concepts>
+#include <cstdint>
 #include <type_traits>
+#include <utility>
 
 #include "can/signals.hpp"
 
@@ -18,7 +21,13 @@ class Packer {
 
     template <const Signal& kSignal, class T>
     void field(const T& value) {
-        put<kSignal>(to_count<kSignal>(static_cast<std::int64_t>(value)));
+        if constexpr (std::is_enum_v<T>) {
+            put<kSignal>(to_count<kSignal>(static_cast<std::underlying_type_t<T>>(value)));
+        } else if constexpr (std::is_same_v<T, bool>) {
+            put<kSignal>(value ? 1 : 0);
+        } else {
+            put<kSignal>(to_count<kSignal>(value));
+        }
     }
 
     template <const Signal& kSignal, class T>
@@ -39,33 +48,39 @@ class Packer {
     void limited() { encoded_.limited = true; }
 
     Encoded finish() {
-        for (unsigned i = 0; i < encoded_.frame.length; ++i)
-            encoded_.frame.data[i] = static_cast<std::uint8_t>(word_ >> (8 * i));
+        static_assert(std::endian::native == std::endian::little);
+        encoded_.frame.data = std::bit_cast<decltype(encoded_.frame.data)>(word_);
         return encoded_;
     }
 
   private:
-    /// Nearest count, halves away from zero, within min..max. Exact: no intermediate leaves 64 bits.
-    template <const Signal& kSignal>
-    std::int64_t to_count(std::int64_t value) {
+    /// Nearest count, halves away from zero, within min..max. In 32 bits: what lies outside is told first.
+    template <const Signal& kSignal, class T>
+    std::int32_t to_count(T value) {
         constexpr std::int64_t kHalf = kSignal.step / 2;
-        const std::int64_t count = (value + (value < 0 ? -kHalf : kHalf)) / kSignal.step;
-        if (count < kSignal.min) {
+        constexpr std::int64_t kLeast = (kSignal.min - 1) * kSignal.step + kHalf + 1;
+        constexpr std::int64_t kMost = (kSignal.max + 1) * kSignal.step - kHalf - 1;
+        static_assert(kSignal.min <= 0 && kSignal.max >= 0);
+        static_assert(std::in_range<std::int32_t>(kLeast - kHalf) &&
+                      std::in_range<std::int32_t>(kMost + kHalf));
+        if (std::cmp_less(value, kLeast)) {
             encoded_.limited = true;
-            return kSignal.min;
+            return static_cast<std::int32_t>(kSignal.min);
         }
-        if (count > kSignal.max) {
+        if (std::cmp_greater(value, kMost)) {
             encoded_.limited = encoded_.limited || !kSignal.or_more;
-            return kSignal.max;
+            return static_cast<std::int32_t>(kSignal.max);
         }
-        return count;
+        const auto units = static_cast<std::int32_t>(value);
+        constexpr auto kHalf32 = static_cast<std::int32_t>(kHalf);
+        return (units + (units < 0 ? -kHalf32 : kHalf32)) / kSignal.step;
     }
 
+    /// Once for each signal: all bits are 0 before.
     template <const Signal& kSignal>
     void put(std::int64_t count) {
         constexpr std::uint64_t kMask = (std::uint64_t{1} << kSignal.length) - 1;
-        word_ = (word_ & ~(kMask << kSignal.start)) |
-                ((static_cast<std::uint64_t>(count) & kMask) << kSignal.start);
+        word_ |= (static_cast<std::uint64_t>(count) & kMask) << kSignal.start;
     }
 
     Encoded encoded_;

@@ -36,7 +36,7 @@ void e2e_protect(Frame& frame, std::uint16_t data_id, std::uint8_t& counter) {
     if (frame.length < 2 || frame.length > frame.data.size()) return;
     frame.data[1] = static_cast<std::uint8_t>((frame.data[1] & 0xF0u) | (counter & 0x0Fu));
     frame.data[0] = e2e_crc(std::span(frame.data).first(frame.length), data_id);
-    counter = static_cast<std::uint8_t>((counter + 1u) % kE2eCounters);
+    counter = static_cast<std::uint8_t>(counter + 1u < kE2eCounters ? counter + 1u : 0u);
 }
 
 E2eStatus e2e_check(E2eReceiverState& state, std::span<const std::uint8_t> bytes, std::uint16_t data_id,

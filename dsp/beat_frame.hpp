@@ -9,8 +9,8 @@
 namespace dsp {
 
 /// 64 chirps x 64 real samples, two's complement ADC codes. In files: little-endian int16, [chirp][sample],
-/// 8192 bytes.
-struct BeatFrame {
+/// 8192 bytes. Aligned as loads of four samples need it.
+struct alignas(4) BeatFrame {
     std::array<std::array<std::int16_t, kSamples>, kChirps> chirp{};
 };
 static_assert(sizeof(BeatFrame) == 8192);

@@ -12,44 +12,17 @@ namespace dsp {
 
 namespace {
 
-constexpr int kMeanBits = 6;  // kSamples = 64: 64 x - sum is the deviation with 6 fraction bits
-static_assert(kSamples == 1 << kMeanBits);
-constexpr int kLowestExponent = -11;
 constexpr int kCommonScale = 2;  ///< bits that a pair gives up for a scale common to the frame
 
 using packed::Pair;
 
 }  // namespace
 
-DcLevels dc_levels(const BeatFrame& frame) {
-    DcLevels levels;
-    for (std::size_t pair = 0; pair < kChirps / 2; ++pair) {
-        std::int32_t largest = 0;  // Q6
-        for (std::size_t k = 2 * pair; k < 2 * pair + 2; ++k) {
-            const std::int16_t* const chirp = frame.chirp[k].data();
-            std::int32_t sum = 0;
-            Pair low = packed::load(chirp);
-            Pair high = low;
-            unrolled<kSamples, 2, 4>([&](std::size_t n) {
-                const Pair samples = packed::load(chirp + n);
-                sum = packed::dot(samples, packed::pack(1, 1), sum);
-                low = packed::smallest(low, samples);
-                high = packed::largest(high, samples);
-            });
-            levels.sum[k] = sum;
-            const std::int32_t top = std::max(packed::lane0(high), packed::lane1(high));
-            const std::int32_t bottom = std::min(packed::lane0(low), packed::lane1(low));
-            largest = std::max({largest, kSamples * top - sum, sum - kSamples * bottom});
-        }
-        const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest)));
-        levels.exponent[pair] =
-            static_cast<std::int16_t>(std::max(bits - kMeanBits - kFftInputBits, kLowestExponent));
+void share_exponent(std::span<std::int16_t, kChirps / 2> exponent) {
+    const std::int16_t highest = *std::ranges::max_element(exponent);
+    for (std::int16_t& e : exponent) {
+        if (highest - e <= kCommonScale) e = highest;
     }
-    const std::int16_t highest = *std::ranges::max_element(levels.exponent);
-    for (std::int16_t& exponent : levels.exponent) {
-        if (highest - exponent <= kCommonScale) exponent = highest;
-    }
-    return levels;
 }
 
 void remove_dc(std::span<const std::int16_t, kSamples> even, std::int32_t even_sum,

@@ -1,7 +1,9 @@
 /// Removal of the converter's offset and of the transmitter's leakage, and the scale of what remains.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 
@@ -11,7 +13,13 @@
 
 namespace dsp {
 
-/// What removal needs to know of a frame before it can start.
+inline constexpr int kMeanBits = 6;  ///< kSamples = 64: 64 x - sum is the deviation with 6 fraction bits
+static_assert(kSamples == 1 << kMeanBits);
+
+/// What removal needs to know of a frame before it can start; inspect() finds it out.
+///
+/// The mean is taken along each chirp, over range. A target whose Doppler shift is zero (a car at the same
+/// speed) keeps its beat frequency and is not touched: only range cell 0 is.
 struct DcLevels {
     std::array<std::int32_t, kChirps> sum{};  ///< of the samples of each chirp: 64 times its mean, exact
     /// Of the deviations of chirps 2i and 2i+1 (which share a transform): deviation = code * 2^exponent, all
@@ -19,15 +27,29 @@ struct DcLevels {
     std::array<std::int16_t, kChirps / 2> exponent{};
 };
 
-/// Means of all chirps, and for each pair the exponent that lets its largest deviation from them use 12 bits:
-/// a 12-bit converter's small codes are lifted before anything is rounded, and a burst of interference costs
-/// precision only in the chirps it hits. Exponents -11..4, -11 without signal. Pairs within 2 of the largest
-/// exponent take that one too: a frame without a burst then has the same scale everywhere.
-///
-/// The mean is taken along each chirp, over range. A target whose Doppler shift is zero (a car at the same
-/// speed) keeps its beat frequency and is not touched: only range cell 0 is.
-/// Cost: about 3 instructions a sample.
-DcLevels dc_levels(const BeatFrame& frame);
+/// Extremes and sum of the samples of a chirp.
+struct ChirpLevel {
+    std::int32_t low;
+    std::int32_t high;
+    std::int32_t sum;
+};
+
+/// The exponent that lets the largest deviation of two chirps from their means use 12 bits: a 12-bit
+/// converter's small codes are lifted before anything is rounded, and a burst of interference costs precision
+/// only in the chirps it hits. -11..4, -11 without signal.
+constexpr int deviation_exponent(const ChirpLevel& even, const ChirpLevel& odd) {
+    constexpr int kLowest = -11;
+    const auto deviations = [](const ChirpLevel& chirp) {  // 64 times both, which are not below zero
+        return static_cast<std::uint32_t>((kSamples * chirp.high - chirp.sum) |
+                                          (chirp.sum - kSamples * chirp.low));
+    };
+    const auto bits = static_cast<int>(std::bit_width(deviations(even) | deviations(odd)));
+    return std::max(bits - kMeanBits - kFftInputBits, kLowest);
+}
+
+/// Exponents within 2 of the largest become the largest: a frame without a burst then has the same scale
+/// everywhere.
+void share_exponent(std::span<std::int16_t, kChirps / 2> exponent);
 
 /// out[n] = window[n] (even[n] - its mean + j (odd[n] - its mean)) / 2^exponent for two chirps with the given
 /// sums. The mean is not rounded by more than 1/256 of the step, the result is rounded down: half a step too

@@ -6,10 +6,11 @@
 
 namespace dsp {
 
-void detect(const BeatFrame& frame, const DspConfig& config, const CellScale& scale, Workspace& workspace,
-            DetectionList& detections) {
+void detect(const BeatFrame& frame, const DcLevels& levels, const DspConfig& config, const CellScale& scale,
+            Workspace& workspace, DetectionList& detections) {
     if (!(workspace.cfar.config() == config.cfar)) workspace.cfar = OsCfar(config.cfar);
-    range_doppler(frame, config.range_window, config.doppler_window, workspace.spectrum, workspace.map);
+    range_doppler(frame, levels, config.range_window, config.doppler_window, workspace.spectrum,
+                  workspace.map);
     workspace.noise_level = noise_level(workspace.map, config.cfar.first_range_cell);
     // Of noise, three quarters of the cells are above this level.
     const std::int32_t level = workspace.noise_level - kLogOne * 5 / 4;
@@ -18,6 +19,13 @@ void detect(const BeatFrame& frame, const DspConfig& config, const CellScale& sc
                peaks);
     extract_peaks(workspace.spectrum, workspace.map, peaks, workspace.cfar, config.range_window,
                   config.doppler_window, config.peaks, scale, detections);
+}
+
+void detect(const BeatFrame& frame, const DspConfig& config, const CellScale& scale, Workspace& workspace,
+            DetectionList& detections) {
+    DcLevels levels;
+    (void)inspect(frame, config.adc_full_scale, levels);
+    detect(frame, levels, config, scale, workspace, detections);
 }
 
 }  // namespace dsp

@@ -40,7 +40,12 @@ struct Workspace {
 static_assert(sizeof(Workspace) <= 14 * 1024);
 
 /// Runs the stages in order. `config.valid()` must hold; a changed configuration takes effect at once.
-/// Never fails: a dead frame gives no detections (frame_quality tells it from an empty road).
+/// Never fails: a dead frame gives no detections (frame_quality tells it from an empty road). `levels`: of
+/// this frame, by inspect().
+void detect(const BeatFrame& frame, const DcLevels& levels, const DspConfig& config, const CellScale& scale,
+            Workspace& workspace, DetectionList& detections);
+
+/// The same for a frame whose quality nobody asks for.
 void detect(const BeatFrame& frame, const DspConfig& config, const CellScale& scale, Workspace& workspace,
             DetectionList& detections);
 

@@ -198,7 +198,7 @@ class Fixed {
     /// value * scale rounded half to even: for signals in integer units, e.g. `in_units(1000)` for mm of
     /// metres.
     [[nodiscard]] constexpr std::int32_t in_units(std::int32_t scale) const {
-        return saturate32(round_shift(static_cast<std::int64_t>(raw_) * scale, FractionBits));
+        return narrowed<FractionBits>(product(raw_, scale));
     }
 
     constexpr auto operator<=>(const Fixed&) const = default;

@@ -455,7 +455,7 @@ constexpr int kUnrolled = 8;
             const packed::Pair wanted = (rest & next) == 0 ? packed::pack(1, 0) : packed::both(1);
             rest &= ~next;
             // Nothing is below a limit of zero.
-            const packed::Pair limits = packed::minus_to_zero(packed::load(pairs + i), thresholds);
+            const packed::Pair limits = packed::floored_sub(packed::load(pairs + i), thresholds);
             packed::Pair above = 0;
             const auto count = [&above, limits](packed::Pair references) {
                 above += packed::at_least(references, limits);

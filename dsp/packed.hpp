@@ -3,6 +3,7 @@
 /// Complex16.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -36,20 +37,6 @@ Pair load(const T* samples) {
     Pair pair;
     std::memcpy(&pair, samples, sizeof pair);
     return pair;
-}
-/// Four samples next to each other, at an address that is a multiple of four bytes: one instruction.
-template <class T>
-void load_pair(const T* samples, Pair& first, Pair& second) {
-#if DSP_PACKED_INTRINSICS
-    static_assert(sizeof(T) == 2);
-    using Word2 [[gnu::may_alias, gnu::aligned(4)]] = std::uint64_t;
-    asm("ldrd %0, %1, %2"
-        : "=r"(first), "=r"(second)
-        : "m"(*static_cast<const Word2*>(static_cast<const void*>(samples))));
-#else
-    first = load(samples);
-    second = load(samples + 2);
-#endif
 }
 template <class T>
 void store(T* samples, Pair pair) {
@@ -128,10 +115,6 @@ constexpr Pair at_least(Pair a, Pair b) {
 constexpr Pair where_at_least(Pair a, Pair b, Pair value) {
     return value & (0xFFFFU * at_least(a, b));
 }
-constexpr Pair minus_to_zero(Pair a, Pair b) {
-    return ((a & 0xFFFFU) > (b & 0xFFFFU) ? (a & 0xFFFFU) - (b & 0xFFFFU) : 0U) |
-           (a >> 16 > b >> 16 ? (a >> 16) - (b >> 16) : 0U) << 16;
-}
 constexpr void order(Pair& low, Pair& high) {
     const Pair swapped = 0xFFFFU * at_least(low, high);
     const Pair change = (low ^ high) & swapped;
@@ -172,6 +155,46 @@ constexpr std::int32_t scale_0(std::int32_t a, Pair b) {
 }
 constexpr std::int32_t scale_1(std::int32_t a, Pair b) {
     return static_cast<std::int32_t>(product(a, lane1(b)) >> 16);
+}
+constexpr Pair floored_sub(Pair a, Pair b) {
+    const auto lane = [](Pair x, Pair y) { return x > y ? x - y : 0U; };
+    return lane(a & 0xFFFFU, b & 0xFFFFU) | lane(a >> 16, b >> 16) << 16;
+}
+constexpr void sort(Pair& a, Pair& b) {
+    const Pair low = smallest(a, b);
+    b = largest(a, b);
+    a = low;
+}
+constexpr std::uint32_t left_aligned(std::uint32_t v, int zeros) {
+    return zeros < 32 ? v << zeros : 0;
+}
+template <class T>
+void load_pair(const T* from, Pair& first, Pair& second) {
+    static_assert(4 % sizeof(T) == 0);
+    std::memcpy(&first, from, sizeof first);
+    std::memcpy(&second, from + sizeof first / sizeof(T), sizeof second);
+}
+template <class T>
+void load_four(const T* from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    load_pair(from, a, b);
+    load_pair(from + 2 * sizeof a / sizeof(T), c, d);
+}
+template <class T>
+void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    load_four(from, a, b, c, d);
+    from += 4 * sizeof a / sizeof(T);
+}
+template <class T>
+void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
+    const std::array<Pair, 4> words{a, b, c, d};
+    std::memcpy(static_cast<void*>(to), words.data(), sizeof words);
+    to += sizeof words / sizeof(T);
+}
+template <class T>
+void store_pair(T* to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    std::memcpy(static_cast<void*>(to), &first, sizeof first);
+    std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
 }
 }  // namespace portable
 
@@ -255,10 +278,6 @@ inline Pair where_at_least(Pair a, Pair b, Pair value) {
     (void)__usub16(a, b);
     return __sel(value, 0U);
 }
-/// Lane by lane, of unsigned numbers, not below zero.
-inline Pair minus_to_zero(Pair a, Pair b) {
-    return __uqsub16(a, b);
-}
 /// Lane by lane, of unsigned numbers: the smaller to `low`, the larger to `high`.
 inline void order(Pair& low, Pair& high) {
     (void)__usub16(low, high);
@@ -304,10 +323,92 @@ inline std::int32_t multiply_10(Pair a, Pair b, std::int32_t sum) {
 }
 /// a times a lane of b, its upper 32 of 48 bits, rounded down
 inline std::int32_t scale_0(std::int32_t a, Pair b) {
-    return __smlawb(a, static_cast<std::int32_t>(b), 0);
+    std::int32_t result;
+    asm("smulwb %0, %1, %2" : "=r"(result) : "r"(a), "r"(b));
+    return result;
 }
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
-    return __smlawt(a, static_cast<std::int32_t>(b), 0);
+    std::int32_t result;
+    asm("smulwt %0, %1, %2" : "=r"(result) : "r"(a), "r"(b));
+    return result;
+}
+/// a - b lane by lane, both unsigned, not below zero
+inline Pair floored_sub(Pair a, Pair b) {
+    return __uqsub16(a, b);
+}
+/// The smaller of the two numbers of each lane to a, the larger to b: one comparison for both.
+inline void sort(Pair& a, Pair& b) {
+    (void)__ssub16(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b));
+    const Pair low = __sel(b, a);
+    b = __sel(a, b);
+    a = low;
+}
+/// v times 2^zeros, 0..32: by all 32 too, which a shift in C++ must not.
+inline std::uint32_t left_aligned(std::uint32_t v, int zeros) {
+    std::uint32_t result;
+    asm("lsl %0, %1, %2" : "=r"(result) : "r"(v), "r"(zeros));
+    return result;
+}
+/// Two words next to each other, aligned to four bytes, with one instruction. The compiler takes it for words
+/// aligned to eight only.
+template <class T>
+void load_pair(const T* from, Pair& first, Pair& second) {
+    static_assert(4 % sizeof(T) == 0);
+    using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
+    asm("ldrd %0, %1, %2" : "=r"(first), "=r"(second) : "o"(*reinterpret_cast<const Words*>(from)));
+}
+/// Four words next to each other; take_four and put_four leave the pointer behind them. One instruction,
+/// which wants its registers in order.
+template <class T>
+void load_four(const T* from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r3");
+    register Pair b_in asm("r4");
+    register Pair c_in asm("r5");
+    register Pair d_in asm("r6");
+    asm volatile("ldmia %4, {%0, %1, %2, %3}"
+                 : "=r"(a_in), "=r"(b_in), "=r"(c_in), "=r"(d_in)
+                 : "r"(from)
+                 : "memory");
+    a = a_in;
+    b = b_in;
+    c = c_in;
+    d = d_in;
+}
+template <class T>
+void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r3");
+    register Pair b_in asm("r4");
+    register Pair c_in asm("r5");
+    register Pair d_in asm("r6");
+    asm volatile("ldmia %4!, {%0, %1, %2, %3}"
+                 : "=r"(a_in), "=r"(b_in), "=r"(c_in), "=r"(d_in), "+r"(from)
+                 :
+                 : "memory");
+    a = a_in;
+    b = b_in;
+    c = c_in;
+    d = d_in;
+}
+template <class T>
+void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r3") = a;
+    register Pair b_in asm("r4") = b;
+    register Pair c_in asm("r5") = c;
+    register Pair d_in asm("r6") = d;
+    asm volatile("stmia %0!, {%1, %2, %3, %4}"
+                 : "+r"(to)
+                 : "r"(a_in), "r"(b_in), "r"(c_in), "r"(d_in)
+                 : "memory");
+}
+/// Two words, as load_pair.
+template <class T>
+void store_pair(T* to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
+    asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
 }
 #else
 using namespace portable;

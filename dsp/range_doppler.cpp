@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <limits>
 
 #include "dsp/fixed_point.hpp"
+#include "dsp/frame_quality.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
 #include "dsp/unrolled.hpp"
@@ -23,59 +25,75 @@ int guard_bits(const Window& window) {
     return window[0] + window[kWindowLength / 2] > (1 << kWindowBits) ? 1 : 0;
 }
 
-int magnitude_bits(std::span<const Complex16, kChirps> row) {
+/// Of all numbers of a row.
+int magnitude_bits(const Complex16* row) {
     Pair spreads = 0;
-    unrolled<kChirps, 1, 8>([&](std::size_t k) { spreads |= packed::spread(std::bit_cast<Pair>(row[k])); });
+    for (const Complex16* const end = row + kChirps; row != end;) {
+        Pair a = 0;
+        Pair b = 0;
+        Pair c = 0;
+        Pair d = 0;
+        packed::take_four(row, a, b, c, d);
+        spreads |= packed::spread(a) | packed::spread(b) | packed::spread(c) | packed::spread(d);
+    }
     return packed::magnitude_bits(spreads);
 }
 
-/// The window, and `down` bits less, for chirps of the same exponent.
-void taper(std::span<Complex16, kChirps> row, const Window& window, int down) {
-    const int shift = kWindowBits + down;  // at least 4: a row has at least one bit
-    const std::int32_t rounding = (1 << shift) >> 1;
-    unrolled<kChirps, 2, 2>([&](std::size_t k) {
-        const Pair x = std::bit_cast<Pair>(row[k]);
-        const Pair y = std::bit_cast<Pair>(row[k + 1]);
-        const Pair w = packed::load(&window[k]);
-        row[k] = std::bit_cast<Complex16>(packed::pack_low(packed::multiply_00(x, w, rounding) >> shift,
-                                                           packed::multiply_10(x, w, rounding) >> shift));
-        row[k + 1] = std::bit_cast<Complex16>(packed::pack_low(packed::multiply_01(y, w, rounding) >> shift,
-                                                               packed::multiply_11(y, w, rounding) >> shift));
+/// The same of chirps that are smaller by their number of bits; at least 1.
+int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
+    constexpr int kUp = 16;  // both lanes, one over the other, in the upper half: nothing is lost below
+    std::uint32_t spreads = 2U << kUp;
+    unrolled<kChirps, 2, 4>([row, smaller, &spreads](std::size_t k) {
+        Pair x = 0;
+        Pair y = 0;
+        packed::load_pair(&row[k], x, y);
+        const Pair spread = packed::spread(x) | packed::spread(y);
+        spreads |= (spread | spread << kUp) >> smaller[k / 2];
     });
+    return static_cast<int>(std::bit_width(spreads >> kUp)) - 1;
 }
 
-/// Whether no chirp has an exponent of its own.
-bool even(const std::array<std::int16_t, kChirps / 2>& exponent) {
-    const Pair first = packed::both(static_cast<std::uint16_t>(exponent[0]));
-    Pair different = 0;
-    unrolled<kChirps / 2, 2, 8>([&](std::size_t i) { different |= packed::load(&exponent[i]) ^ first; });
-    return different == 0;
+template <bool kUpperHalf>
+Pair product(Pair x, std::int32_t weight) {
+    const std::int32_t re = packed::scale_0(weight, x);
+    const std::int32_t im = packed::scale_1(weight, x);
+    return kUpperHalf ? packed::pack_high(re, im) : packed::pack_low(re, im);
 }
 
-/// The same for chirps of different exponents, value = row * 2^exponent: as many bits as the row's largest
-/// allows. Returns by how many bits the row became smaller, relative to 2^highest.
-int taper_uneven(std::span<Complex16, kChirps> row, const std::array<std::int16_t, kChirps / 2>& exponent,
-                 int highest, const Window& window, int guard) {
-    constexpr int kExtraBits =
-        15;  // a small chirp beside a burst keeps its own precision until the scale is known
-    const auto down_of = [&](std::size_t k) { return std::min(highest - exponent[k / 2], 31); };
-    std::uint32_t magnitude = 1;
-    for (std::size_t k = 0; k < kChirps; ++k) {
-        for (const std::int32_t x : {row[k].re, row[k].im}) {
-            magnitude |= static_cast<std::uint32_t>(x ^ (x >> 31)) << kExtraBits >> down_of(k);
-        }
+template <bool kUpperHalf>
+inline void scale_four(Complex16*& row, const std::int32_t*& weight, int shift) {
+    Pair a = 0;
+    Pair b = 0;
+    Pair c = 0;
+    Pair d = 0;
+    packed::take_four(weight, a, b, c, d);
+    const std::int32_t wa = static_cast<std::int32_t>(a) >> shift;
+    const std::int32_t wb = static_cast<std::int32_t>(b) >> shift;
+    const std::int32_t wc = static_cast<std::int32_t>(c) >> shift;
+    const std::int32_t wd = static_cast<std::int32_t>(d) >> shift;
+    packed::load_four(row, a, b, c, d);
+    packed::put_four(row, product<kUpperHalf>(a, wa), product<kUpperHalf>(b, wb), product<kUpperHalf>(c, wc),
+                     product<kUpperHalf>(d, wd));
+}
+
+/// row[k] = row[k] * weight[k] / 2^(shift + 16), or / 2^shift from the upper half of a product, rounded down.
+template <bool kUpperHalf>
+void scale(Complex16* row, const std::int32_t* weight, int shift) {
+    for (const Complex16* const end = row + kChirps; row != end;) {
+        scale_four<kUpperHalf>(row, weight, shift);
+        scale_four<kUpperHalf>(row, weight, shift);
     }
-    const int down = static_cast<int>(std::bit_width(magnitude)) - kExtraBits - kFftInputBits + guard;
-    for (std::size_t k = 0; k < kChirps; ++k) {
-        const int shift = kWindowBits + down_of(k) + down;
-        const auto scale = [&](std::int32_t x) {
-            const std::int64_t product = std::int64_t{x} * window[k];
-            return static_cast<std::int16_t>(shift >= 0 ? round_shift(product, std::min(shift, 62))
-                                                        : product * (std::int64_t{1} << -shift));
-        };
-        row[k] = {scale(row[k].re), scale(row[k].im)};
-    }
-    return down;
+}
+
+inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t* to) {
+    Pair a = 0;
+    Pair b = 0;
+    Pair c = 0;
+    Pair d = 0;
+    packed::take_four(from, a, b, c, d);
+    const auto square = [](Pair x) { return static_cast<std::uint32_t>(packed::dot(x, x, 0)); };  // <= 2^31
+    const Pair first = log2_coarse_q10(square(a), square(b), bias);
+    packed::store_pair(to, first, log2_coarse_q10(square(c), square(d), bias));
 }
 
 }  // namespace
@@ -99,40 +117,66 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
     }
 }
 
-void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell) {
-    auto& row = spectrum.row[static_cast<std::size_t>(range_cell)];
-    const int guard = guard_bits(window);
-    int highest = spectrum.chirp_exponent[0];
-    int down = 0;
-    if (even(spectrum.chirp_exponent)) {
-        down = magnitude_bits(row) - kFftInputBits + guard;
-        taper(row, window, down);
-    } else {
-        highest = *std::ranges::max_element(spectrum.chirp_exponent);
-        down = taper_uneven(row, spectrum.chirp_exponent, highest, window, guard);
+ChirpTaper::ChirpTaper(const Window& window, const std::array<std::int16_t, kChirps / 2>& exponent)
+    : highest_(*std::ranges::max_element(exponent)),
+      guard_(guard_bits(window)),
+      even_(std::ranges::count(exponent, highest_) == kChirps / 2) {
+    for (std::size_t k = 0; k < kChirps; k += 2) {
+        const int smaller = highest_ - exponent[k / 2];
+        smaller_[k / 2] = static_cast<std::uint8_t>(smaller);
+        weight_[k] = window[k] * (1 << 16) >> smaller;
+        weight_[k + 1] = window[k + 1] * (1 << 16) >> smaller;
     }
+}
+
+int ChirpTaper::apply(std::array<Complex16, kChirps>& row) const {
+    const int bits = even_ ? magnitude_bits(row.data()) : magnitude_bits(row.data(), smaller_.data());
+    const int down = bits - kFftInputBits + guard_;
+    if (down <= 1) {
+        scale<false>(row.data(), weight_.data(), kWindowBits + down);
+    } else {
+        scale<true>(row.data(), weight_.data(), down - 1);
+    }
+    return highest_ + down;
+}
+
+void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int range_cell) {
+    auto& row = spectrum.row[static_cast<std::size_t>(range_cell)];
+    const int exponent = taper.apply(row);
     fft64(row);
+    // The taper rounds down: half a step in each of 64 chirps, in standstill alone.
+    constexpr std::uint16_t kBias = kFftLength / 2 >> kFftExponent;
+    row[0] = std::bit_cast<Complex16>(packed::add(std::bit_cast<Pair>(row[0]), packed::both(kBias)));
     spectrum.row_exponent[static_cast<std::size_t>(range_cell)] =
-        static_cast<std::int16_t>(highest + down + kFftExponent);
+        static_cast<std::int16_t>(exponent + kFftExponent);
 }
 
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
                std::span<std::uint16_t, kDopplerCells> power) {
-    const std::int32_t scale = 2 * exponent * kLogOne;
-    unrolled<kDopplerCells, 1, 4>([&](std::size_t d) {
-        const Pair x = std::bit_cast<Pair>(row[d]);
-        const auto square = static_cast<std::uint32_t>(packed::dot(x, x, 0));  // at most 2^31
-        power[d] = static_cast<std::uint16_t>(std::max<std::int32_t>(log2_coarse_q10(square, scale), 0));
-    });
+    const Pair bias = log2_bias(2 * exponent * kLogOne);
+    const Complex16* from = row.data();
+    std::uint16_t* to = power.data();
+    for (const Complex16* const end = from + kDopplerCells; from != end; to += 8) {
+        log_power_of_four(from, bias, to);
+        log_power_of_four(from, bias, to + 4);
+    }
+}
+
+void range_doppler(const BeatFrame& frame, const DcLevels& levels, WindowKind range_window,
+                   WindowKind doppler_window, Spectrum& spectrum, PowerMap& map) {
+    range_transform(frame, levels, window(range_window), spectrum);
+    const ChirpTaper taper(window(doppler_window), spectrum.chirp_exponent);
+    for (std::size_t r = 0; r < kRangeCells; ++r) {
+        doppler_transform(spectrum, taper, static_cast<int>(r));
+        log_power(spectrum.row[r], spectrum.row_exponent[r], map.cell[r]);
+    }
 }
 
 void range_doppler(const BeatFrame& frame, WindowKind range_window, WindowKind doppler_window,
                    Spectrum& spectrum, PowerMap& map) {
-    range_transform(frame, dc_levels(frame), window(range_window), spectrum);
-    for (std::size_t r = 0; r < kRangeCells; ++r) {
-        doppler_transform(spectrum, window(doppler_window), static_cast<int>(r));
-        log_power(spectrum.row[r], spectrum.row_exponent[r], map.cell[r]);
-    }
+    DcLevels levels;
+    (void)inspect(frame, std::numeric_limits<std::int16_t>::max(), levels);
+    range_doppler(frame, levels, range_window, doppler_window, spectrum, map);
 }
 
 }  // namespace dsp

@@ -44,15 +44,37 @@ struct PowerMap {
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum);
 
-/// Window and transform over the chirps of one range cell, in place. Each row has its own exponent, from its
-/// own largest sample. Chirps of different exponents (a burst in some) take several times as long.
-void doppler_transform(Spectrum& spectrum, const Window& window, int range_cell);
+/// The window over the chirps of one frame, whose chirps may have different exponents.
+class ChirpTaper {
+  public:
+    /// `exponent`: of chirps 2i and 2i+1, at most 15 apart.
+    ChirpTaper(const Window& window, const std::array<std::int16_t, kChirps / 2>& exponent);
 
-/// One row of the map from one row of the spectrum. By log2_coarse_q10; a cell of zero reads as one step.
+    /// Applies it in place, rounded down, and returns the row's exponent: the largest number of the row gets
+    /// kFftInputBits, or one less for windows that add up to more than one over half their length.
+    int apply(std::array<Complex16, kChirps>& row) const;
+
+  private:
+    std::array<std::int32_t, kChirps> weight_{};       ///< Q31: window * 2^(exponent - highest)
+    std::array<std::uint8_t, kChirps / 2> smaller_{};  ///< highest - exponent
+    int highest_;
+    int guard_;
+    bool even_;  ///< all exponents equal
+};
+
+/// Window and transform over the chirps of one range cell, in place. Each row has its own exponent, from its
+/// own largest sample.
+void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int range_cell);
+
+/// One row of the map from one row of the spectrum. By log2_coarse_q10.
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
                std::span<std::uint16_t, kDopplerCells> power);
 
-/// All of it, DC levels included.
+/// All of it. `levels`: of this frame, by inspect().
+void range_doppler(const BeatFrame& frame, const DcLevels& levels, WindowKind range_window,
+                   WindowKind doppler_window, Spectrum& spectrum, PowerMap& map);
+
+/// The same for a frame whose quality nobody asks for.
 void range_doppler(const BeatFrame& frame, WindowKind range_window, WindowKind doppler_window,
                    Spectrum& spectrum, PowerMap& map);
 

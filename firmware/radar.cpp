@@ -199,9 +199,10 @@ void Radar::acquire_and_detect() {
     sequence_ = sequence;
     sequence_known_ = true;
 
-    observation_.quality = dsp::inspect(frame_, config_.dsp.adc_full_scale);
+    dsp::DcLevels levels;
+    observation_.quality = dsp::inspect(frame_, config_.dsp.adc_full_scale, levels);
     if (health_.inspect(observation_.quality)) {
-        dsp::detect(frame_, config_.dsp, scale_, workspace_, detections_);
+        dsp::detect(frame_, levels, config_.dsp, scale_, workspace_, detections_);
         observation_.detected = true;
         observation_.noise_log2_q10 = workspace_.noise_level;
     }

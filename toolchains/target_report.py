@@ -339,7 +339,7 @@ def print_kernels(results):
              and n not in ("rom", "ram", "stack", "chirp", "frame.mean", "loop.mean", "loop.worst") and not n.endswith(".cell")]
     rows = [[n, *[number(r["figures"].get(n)) for r in results.values()]] for n in names]
     table("Kernels, instructions", ["kernel", *[BOARDS[b].core for b in results]], rows,
-          ["doppler_transform and log_power: one of 32 range cells; dc_levels, range_transform, inspect, noise_level, cfar, "
+          ["doppler_transform and log_power: one of 32 range cells; range_transform, inspect, noise_level, cfar, "
            "extract_peaks,", "detect: a whole frame; can.frame: encoding and protection of one CAN frame."])
 
 

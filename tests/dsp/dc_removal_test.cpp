@@ -1,9 +1,11 @@
 // Expected values: exact rational arithmetic, or worked by hand.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 
 #include "dsp/dc_removal.hpp"
+#include "dsp/frame_quality.hpp"
 
 #include <CppUTest/TestHarness.h>
 
@@ -12,6 +14,12 @@ namespace {
 std::uint32_t lcg(std::uint32_t& state) {
     state = state * 1664525U + 1013904223U;
     return state >> 8;
+}
+
+dsp::DcLevels levels_of(const dsp::BeatFrame& frame) {
+    dsp::DcLevels levels;
+    (void)dsp::inspect(frame, 32767, levels);
+    return levels;
 }
 
 }  // namespace
@@ -24,7 +32,7 @@ TEST_GROUP(DcRemoval) {
     /// Every sample of every chirp against window (x - mean) / 2^exponent, rounded down: the step below, and
     /// a little for the mean's own rounding. Returns the largest output.
     int check_all() {
-        const dsp::DcLevels levels = dsp::dc_levels(frame);
+        const dsp::DcLevels levels = levels_of(frame);
         int largest = 0;
         const auto check = [&](std::size_t k, std::size_t n, int part) {
             const double mean = static_cast<double>(levels.sum[k]) / 64;
@@ -69,6 +77,26 @@ TEST(DcRemoval, RemovesTheMeanOfEachChirpAndUsesTheFormat) {
     }
 }
 
+TEST(DcRemoval, TheExponentIsThatOfTheLargestDeviation) {
+    for (const int scale : {1, 5, 60, 700, 9000, 32767}) {
+        fill(scale);
+        const auto got = levels_of(frame).exponent;
+        std::array<int, 32> expected{};
+        for (std::size_t i = 0; i < 32; ++i) {
+            double largest = 0;
+            for (const auto& chirp : {frame.chirp[2 * i], frame.chirp[2 * i + 1]}) {
+                double mean = 0;
+                for (const auto x : chirp) mean += x / 64.0;
+                for (const auto x : chirp) largest = std::max(largest, std::abs(x - mean));
+            }
+            expected[i] = std::ilogb(largest) + 1 - 12;
+        }
+        const int highest = *std::ranges::max_element(expected);
+        for (std::size_t i = 0; i < 32; ++i)
+            LONGS_EQUAL(highest - expected[i] <= 2 ? highest : expected[i], got[i]);
+    }
+}
+
 TEST(DcRemoval, AppliesTheWindow) {
     for (const auto kind : {dsp::WindowKind::hann, dsp::WindowKind::blackman}) {
         window = dsp::window(kind);
@@ -87,13 +115,13 @@ TEST(DcRemoval, FullScaleStepsFit) {
             chirp[17] = static_cast<std::int16_t>(sign > 0 ? 32767 : -32768);
         }
         CHECK(check_all() <= 1 << dsp::kFftInputBits);
-        for (const auto exponent : dsp::dc_levels(frame).exponent) LONGS_EQUAL(4, exponent);
+        for (const auto exponent : levels_of(frame).exponent) LONGS_EQUAL(4, exponent);
     }
 }
 
 TEST(DcRemoval, OneCodeIsLifted) {
     frame.chirp[5][7] = 1;  // deviation 63/64 and -1/64
-    const dsp::DcLevels levels = dsp::dc_levels(frame);
+    const dsp::DcLevels levels = levels_of(frame);
     LONGS_EQUAL(-11, levels.exponent[2]);
     dsp::remove_dc(frame.chirp[4], levels.sum[4], frame.chirp[5], levels.sum[5], levels.exponent[2], window,
                    out);
@@ -107,18 +135,18 @@ TEST(DcRemoval, ABurstHasItsOwnScaleAndTheOthersShareOne) {
     for (auto& s : frame.chirp[21]) s = static_cast<std::int16_t>(100 * s);
     for (auto& s : frame.chirp[40]) s = static_cast<std::int16_t>(s / 2);
     for (auto& s : frame.chirp[41]) s = static_cast<std::int16_t>(s / 2);
-    const auto exponent = dsp::dc_levels(frame).exponent;
+    const auto exponent = levels_of(frame).exponent;
     for (std::size_t i = 0; i < 32; ++i)
         CHECK(i == 10 ? exponent[i] > exponent[0] + 4 : exponent[i] <= exponent[0] + 1);
     for (auto& s : frame.chirp[21]) s = static_cast<std::int16_t>(s / 100);
-    const auto calm = dsp::dc_levels(frame).exponent;
+    const auto calm = levels_of(frame).exponent;
     for (const auto e : calm) LONGS_EQUAL(calm[0], e);
 }
 
 TEST(DcRemoval, AConstantFrameBecomesZero) {
     for (auto& chirp : frame.chirp) chirp.fill(1234);
     LONGS_EQUAL(0, check_all());
-    for (const auto exponent : dsp::dc_levels(frame).exponent) LONGS_EQUAL(-11, exponent);
+    for (const auto exponent : levels_of(frame).exponent) LONGS_EQUAL(-11, exponent);
 }
 
 TEST(DcRemoval, ATargetAtTheSameSpeedStays) {

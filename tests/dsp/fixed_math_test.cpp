@@ -53,9 +53,42 @@ void sweep_functions(std::uint64_t seed) {
     CHECK(ln_error.lsb <= 1);
     CHECK(sqrt_error.lsb <= 1);
 }
+/// Roots of numbers beside squares and beside the middles between them, where rounding turns.
+template <int F>
+void check_roots() {
+    const auto check = [](std::int64_t raw) {
+        if (raw < 1 || raw > 0x7FFF'FFFF) return;
+        const auto root =
+            static_cast<std::uint64_t>(dsp::sqrt(Fixed<F>::from_raw(static_cast<std::int32_t>(raw))).raw());
+        const std::uint64_t four_squares = static_cast<std::uint64_t>(raw) << (F + 2);
+        CHECK((2 * root - 1) * (2 * root - 1) < four_squares &&
+              four_squares < (2 * root + 1) * (2 * root + 1));
+    };
+    std::mt19937_64 random(F);
+    for (int bit = 0; bit < 31; ++bit) {
+        for (int i = -2; i <= 2; ++i) check((std::int64_t{1} << bit) + i);
+        for (int i = 0; i < 3000; ++i) {
+            const std::int64_t root = static_cast<std::int64_t>(random() & ((1ULL << (bit / 2 + 1)) - 1));
+            for (int beside = -1; beside <= 1; ++beside) {
+                check(root * root + beside);
+                check(root * root + root + beside);
+            }
+            check(static_cast<std::int64_t>(random() & ((2ULL << bit) - 1)));
+        }
+    }
+    check(0x7FFF'FFFF);
+}
 }  // namespace
 
 TEST_GROUP(FixedMath){};
+
+TEST(FixedMath, SquareRootIsTheNearestNumber) {
+    check_roots<4>();
+    check_roots<16>();
+    check_roots<22>();
+    check_roots<26>();
+    check_roots<30>();
+}
 
 TEST(FixedMath, ExpLnSqrtStayWithinTheirBoundsInEveryFormat) {
     sweep_functions<22>(1);

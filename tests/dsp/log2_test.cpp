@@ -26,14 +26,29 @@ TEST(Log2, CoarseLogarithmIsWithinItsStatedErrorAndNeverFalls) {
     double worst = 0;
     std::int32_t last = 0;
     const auto check = [&](std::uint32_t v) {
-        const std::int32_t now = dsp::log2_coarse_q10(v);
+        const dsp::packed::Pair both = dsp::log2_coarse_q10(v, v ^ 1, dsp::log2_bias(0));
+        const auto now = static_cast<std::int32_t>(both & 0xFFFF);
         worst = std::max(worst, std::abs(now - 1024 * std::log2(static_cast<double>(v))));
         CHECK(now >= last);
         last = now;
+        if (v > 1)
+            worst = std::max(worst, std::abs((both >> 16) - 1024 * std::log2(static_cast<double>(v ^ 1))));
     };
     for (std::uint32_t v = 1; v < 1U << 18; ++v) check(v);
     for (std::uint64_t v = 1U << 18; v < 1ULL << 32; v += 40'009) check(static_cast<std::uint32_t>(v));
     CHECK(worst <= 3.5);
+}
+
+TEST(Log2, CoarseLogarithmAddsAnOffsetAndEndsAtZero) {
+    for (int offset = -66 * 1024; offset <= 32 * 1024; offset += 1021) {
+        for (const double v : {0.0, 1.0, 77.0, 65536.0, 2147483648.0, 4294967295.0}) {
+            const double exact = std::max(1024 * std::log2(v == 0 ? 0.5 : v) + offset, 0.0);
+            const auto x = static_cast<std::uint32_t>(v);
+            const dsp::packed::Pair both = dsp::log2_coarse_q10(x, 1U << 31, dsp::log2_bias(offset));
+            DOUBLES_EQUAL(std::min(exact, 65535.0), both & 0xFFFF, 3.5);
+            DOUBLES_EQUAL(std::max(31 * 1024 + offset, 0), both >> 16, 3.5);
+        }
+    }
 }
 
 TEST(Log2, LogarithmNeverFalls) {

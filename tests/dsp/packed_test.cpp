@@ -59,7 +59,6 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     const auto where = [](bool here, int x) { return wrap16(here ? x : 0); };
     lanes(where(u0 >= v0, 1), where(u1 >= v1, 1), at_least(a, b));
     lanes(where(u0 >= v0, 7), where(u1 >= v1, -9), where_at_least(a, b, pack(7, -9)));
-    lanes(where(u0 > v0, u0 - v0), where(u1 > v1, u1 - v1), minus_to_zero(a, b));
     Pair low = a;
     Pair high = b;
     order(low, high);
@@ -71,6 +70,13 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
         return (x / 256 >= y / 256 ? 256 : 0) + (x % 256 >= y % 256 ? 1 : 0);
     };
     lanes(bytes(u0, v0), bytes(u1, v1), static_cast<Pair>(bytes_at_least(a, b)));
+    Pair smaller = a;
+    Pair larger = b;
+    sort(smaller, larger);
+    lanes(std::min(a0, b0), std::min(a1, b1), smaller);
+    lanes(std::max(a0, b0), std::max(a1, b1), larger);
+    const auto above = [](int x, int y) { return wrap16(std::max((x & 0xFFFF) - (y & 0xFFFF), 0)); };
+    lanes(above(a0, b0), above(a1, b1), floored_sub(a, b));
     const auto product = [](std::int64_t x, std::int64_t y) { return x * y; };
     LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1) + sum), dot(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b0) - product(a1, b1) + sum), dot_minus(a, b, sum));
@@ -109,16 +115,47 @@ TEST(Packed, RandomNumbers) {
     }
 }
 
-TEST(Packed, SamplesGoToMemoryAndBack) {
-    alignas(4) const std::array<std::uint16_t, 4> samples{1, 2, 0xFFFE, 0xFFFF};
+TEST(Packed, AWordGoesToMemory) {
+    std::array<std::uint16_t, 4> copy{};
+    store(&copy[1], pack(-2, -1));
+    CHECK(copy == (std::array<std::uint16_t, 4>{0, 0xFFFE, 0xFFFF, 0}));
+}
+
+TEST(Packed, LeftAlignedShiftsByAllBitsToo) {
+    for (int zeros = 0; zeros < 32; ++zeros) {
+        UNSIGNED_LONGS_EQUAL(0x80000001U << zeros, left_aligned(0x80000001U, zeros));
+    }
+    UNSIGNED_LONGS_EQUAL(0, left_aligned(0xFFFFFFFFU, 32));
+}
+
+TEST(Packed, TwoWordsGoThroughMemory) {
+    alignas(4) std::array<std::int16_t, 6> samples{1, -2, 3, -4, 5, -6};
     Pair first = 0;
     Pair second = 0;
-    load_pair(samples.data(), first, second);
-    lanes(1, 2, first);
-    lanes(-2, -1, second);
-    std::array<std::uint16_t, 4> copy{};
-    store(&copy[1], second);
-    CHECK(copy == (std::array<std::uint16_t, 4>{0, 0xFFFE, 0xFFFF, 0}));
+    load_pair(&samples[2], first, second);
+    lanes(3, -4, first);
+    lanes(5, -6, second);
+    store_pair(samples.data(), second, first);
+    CHECK((samples == std::array<std::int16_t, 6>{5, -6, 3, -4, 5, -6}));
+}
+
+TEST(Packed, FourWordsGoThroughMemory) {
+    std::array<std::uint32_t, 9> words{1, 2, 3, 4, 5, 6, 7, 8, 9};
+    Pair a = 0;
+    Pair b = 0;
+    Pair c = 0;
+    Pair d = 0;
+    const std::uint32_t* from = &words[0];
+    take_four(from, a, b, c, d);
+    POINTERS_EQUAL(&words[4], from);
+    CHECK(a == 1 && b == 2 && c == 3 && d == 4);
+    load_four(from, a, b, c, d);
+    POINTERS_EQUAL(&words[4], from);
+    CHECK(a == 5 && b == 6 && c == 7 && d == 8);
+    std::uint32_t* to = &words[1];
+    put_four(to, d, c, b, a);
+    POINTERS_EQUAL(&words[5], to);
+    CHECK((words == std::array<std::uint32_t, 9>{1, 8, 7, 6, 5, 6, 7, 8, 9}));
 }
 
 TEST(Packed, MagnitudeBitsCoverEveryValue) {

@@ -1,5 +1,6 @@
 // Expected values: the same chain in double precision.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -81,6 +82,60 @@ TEST(RangeDoppler, ABurstInTwoChirpsLeavesTheOthersTheirPrecision) {
     // A burst is no tone: its rounding, twice the power after the pair is taken apart, has no gain from the
     // sum over the chirps, and the largest cell, the last of a burst beyond the band, only 2^13 steps.
     compare(frame, WindowKind::hann, WindowKind::hann, 3.4e-4);
+}
+
+TEST(RangeDoppler, TheTaperScalesEveryRowToItsLargestNumber) {
+    for (const auto kind : {WindowKind::rectangular, WindowKind::hann, WindowKind::blackman}) {
+        const dsp::Window& window = dsp::window(kind);
+        const int full = kind == WindowKind::rectangular ? 11 : 12;  // bits
+        for (const int spread : {0, 1, 6, 15}) {
+            std::array<std::int16_t, 32> exponent{};
+            for (auto& e : exponent)
+                e = static_cast<std::int16_t>(
+                    4 - static_cast<int>(random() % (1U + static_cast<unsigned>(spread))));
+            exponent[7] = 4;
+            const dsp::ChirpTaper taper(window, exponent);
+            for (int bits = 0; bits <= 15; ++bits) {
+                std::array<dsp::Complex16, 64> row{};
+                const auto draw = [&] {
+                    const std::uint32_t range = 2U << bits;
+                    return static_cast<std::int16_t>(static_cast<int>(random() % range) - (1 << bits));
+                };
+                for (auto& x : row) x = {draw(), draw()};
+                row[14].re = static_cast<std::int16_t>(-(1 << bits));
+                std::array<dsp::Complex16, 64> tapered = row;
+                const int result = taper.apply(tapered);
+                LONGS_EQUAL(4 + std::max(bits, 1) - full, result);
+                for (std::size_t k = 0; k < 64; ++k) {
+                    // Rounded down; weights of small chirps end at the same place as the result does.
+                    const double scale = std::ldexp(window[k] / 32768.0, exponent[k / 2] - result);
+                    DOUBLES_EQUAL(row[k].re * scale - 0.5, tapered[k].re, spread == 0 ? 0.5 : 1.0);
+                    DOUBLES_EQUAL(row[k].im * scale - 0.5, tapered[k].im, spread == 0 ? 0.5 : 1.0);
+                    CHECK(std::max(std::abs(tapered[k].re), std::abs(tapered[k].im)) <= 1 << full);
+                }
+            }
+        }
+    }
+}
+
+TEST(RangeDoppler, PowerIsTheLogarithmOfTheSquare) {
+    std::array<dsp::Complex16, 64> row{};
+    std::array<std::uint16_t, 64> power{};
+    for (int exponent = -17; exponent <= 14; ++exponent) {
+        for (std::size_t d = 0; d < 64; ++d) {
+            const auto draw = [&] {
+                return static_cast<std::int16_t>(static_cast<std::int16_t>(random()) >> d / 4);
+            };
+            row[d] = {draw(), draw()};
+        }
+        row[5] = {-32768, -32768};
+        row[6] = {};
+        dsp::log_power(row, exponent, power);
+        for (std::size_t d = 0; d < 64; ++d) {
+            const double square = std::max(std::pow(row[d].re, 2) + std::pow(row[d].im, 2), 0.5);
+            DOUBLES_EQUAL(std::max(1024 * (std::log2(square) + 2 * exponent), 0.0), power[d], 3.5);
+        }
+    }
 }
 
 TEST(RangeDoppler, FullScaleSquareWavesDoNotOverflow) {

@@ -123,18 +123,17 @@ void measure_transforms() {
             [](std::uint32_t i) { dsp::fft64_real_pair(spectra[i], workspace.spectrum.row[0].data()); });
 
     const dsp::Window& window = dsp::window(kConfig.range_window);
-    measure("dc_levels", kFrameRepeats, [](std::uint32_t) { (void)dsp::dc_levels(four); });
-    const dsp::DcLevels levels = dsp::dc_levels(four);
+    dsp::DcLevels levels;
+    measure("inspect", kFrameRepeats,
+            [&](std::uint32_t) { (void)dsp::inspect(four, kConfig.adc_full_scale, levels); });
     measure("range_transform", kFrameRepeats,
             [&](std::uint32_t) { dsp::range_transform(four, levels, window, workspace.spectrum); });
-    measure("doppler_transform", dsp::kRangeCells, [&](std::uint32_t r) {
-        dsp::doppler_transform(workspace.spectrum, window, static_cast<int>(r));
-    });
+    const dsp::ChirpTaper taper(window, workspace.spectrum.chirp_exponent);
+    measure("doppler_transform", dsp::kRangeCells,
+            [&](std::uint32_t r) { dsp::doppler_transform(workspace.spectrum, taper, static_cast<int>(r)); });
     measure("log_power", dsp::kRangeCells, [](std::uint32_t r) {
         dsp::log_power(workspace.spectrum.row[r], workspace.spectrum.row_exponent[r], workspace.map.cell[r]);
     });
-    measure("inspect", kFrameRepeats,
-            [](std::uint32_t) { (void)dsp::inspect(four, kConfig.adc_full_scale); });
     measure("noise_level", kFrameRepeats,
             [](std::uint32_t) { (void)dsp::noise_level(workspace.map, kConfig.cfar.first_range_cell); });
 }
@@ -148,8 +147,10 @@ void measure_cfar(std::string_view name) {
 
 void measure_frame(const dsp::BeatFrame& frame, std::string_view cfar, std::string_view peaks,
                    std::string_view whole) {
+    dsp::DcLevels levels;
+    (void)dsp::inspect(frame, kConfig.adc_full_scale, levels);
     measure(whole, kFrameRepeats,
-            [&](std::uint32_t) { dsp::detect(frame, kConfig, kScale, workspace, detections); });
+            [&](std::uint32_t) { dsp::detect(frame, levels, kConfig, kScale, workspace, detections); });
     measure_cfar(cfar);
     measure(peaks, kFrameRepeats, [](std::uint32_t) {
         dsp::extract_peaks(workspace.spectrum, workspace.map, hits, workspace.cfar, kConfig.range_window,
