@@ -1,0 +1,114 @@
+// Expected values: the windowed discrete Fourier transform in double precision, from its definition.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+
+#include "dsp/range_fft.hpp"
+#include "tests/bench/dsp_reference.hpp"
+
+#include <CppUTest/TestHarness.h>
+
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr std::int16_t kUntouched = 12345;
+
+}  // namespace
+
+TEST_GROUP(RangeFft) {
+    std::array<std::int16_t, 128> samples{};
+    std::array<dsp::Complex16, 32 * 64> out;
+    dsp::Window window = dsp::window(dsp::WindowKind::hann);
+    bench::Random random{31};
+
+    dsp::ChirpPair pair(int exponent) const {
+        dsp::ChirpPair chirps{samples.data(), {0, 0}, exponent};
+        for (std::size_t n = 0; n < 128; ++n) chirps.sum[n / 64] += samples[n];
+        return chirps;
+    }
+    /// The smallest exponent that lets the deviations fit, as the interface asks for.
+    int smallest_exponent() const {
+        const dsp::ChirpPair chirps = pair(0);
+        int largest = 0;
+        for (std::size_t n = 0; n < 128; ++n) {
+            largest = std::max(largest, std::abs(64 * samples[n] - chirps.sum[n / 64]));
+        }
+        int exponent = -11;
+        while (largest > std::ldexp(64 << dsp::kFftInputBits, exponent)) ++exponent;
+        return exponent;
+    }
+    std::array<Complex, 64> exact(std::size_t chirp, int exponent) const {
+        const double mean = pair(0).sum[chirp] / 64.0;
+        std::array<Complex, 64> x;
+        for (std::size_t n = 0; n < 64; ++n) {
+            x[n] = (samples[64 * chirp + n] - mean) * window[n] / 32768;
+        }
+        std::array<Complex, 64> spectrum = bench::dft64(x);
+        for (Complex& s : spectrum) s = std::ldexp(1.0, -exponent - dsp::kRangeFftExponent) * s;
+        return spectrum;
+    }
+    const std::array<dsp::Complex16, 32 * 64>& run(int exponent) {
+        out.fill({kUntouched, kUntouched});
+        dsp::range_fft(pair(exponent), dsp::RangeWindow(window), out.data());
+        return out;
+    }
+    /// Every cell, against clipped sums where these exceed 16 bits.
+    void check(int exponent, double tolerance) {
+        run(exponent);
+        for (std::size_t c = 0; c < 2; ++c) {
+            const auto expected = exact(c, exponent);
+            for (std::size_t k = 0; k < 32; ++k) {
+                const dsp::Complex16 got = out[64 * k + c];
+                DOUBLES_EQUAL(std::clamp(expected[k].real(), -32768.0, 32767.0), got.re, tolerance);
+                DOUBLES_EQUAL(std::clamp(expected[k].imag(), -32768.0, 32767.0), got.im, tolerance);
+                CHECK((out[64 * k + 2] == dsp::Complex16{kUntouched, kUntouched}));
+            }
+        }
+    }
+};
+
+TEST(RangeFft, RandomChirpsOfEveryScale) {
+    for (const auto kind : {dsp::WindowKind::hann, dsp::WindowKind::blackman}) {
+        window = dsp::window(kind);
+        for (const int scale : {1, 3, 50, 300, 2047, 7000, 32767}) {
+            for (int t = 0; t < 100; ++t) {
+                for (std::size_t n = 0; n < 128; ++n) {
+                    const int draw = static_cast<int>(random() % static_cast<unsigned>(2 * scale + 1)) - scale;
+                    samples[n] = static_cast<std::int16_t>(n < 64 ? draw : draw / (t % 4 + 1));
+                }
+                check(smallest_exponent(), 4);
+                check(smallest_exponent() + 1, 4);
+            }
+        }
+    }
+}
+
+TEST(RangeFft, NoiseAndBias) {
+    for (const int scale : {40, 32767}) {
+        constexpr int kTransforms = 4000;
+        double noise = 0;
+        std::array<Complex, 64> bias{};
+        for (int t = 0; t < kTransforms; ++t) {
+            for (auto& s : samples) {
+                s = static_cast<std::int16_t>(static_cast<int>(random() % static_cast<unsigned>(2 * scale)) - scale);
+            }
+            const int exponent = smallest_exponent();
+            run(exponent);
+            for (std::size_t c = 0; c < 2; ++c) {
+                const auto expected = exact(c, exponent);
+                for (std::size_t k = 0; k < 32; ++k) {
+                    const Complex error = Complex(out[64 * k + c].re, out[64 * k + c].im) - expected[k];
+                    noise += std::norm(error) / (2 * 2 * 32 * kTransforms);
+                    bias[2 * k + c] += error / static_cast<double>(kTransforms);
+                }
+            }
+        }
+        std::printf("scale %d noise %f\n", scale, noise);
+        for (std::size_t i = 0; i < 64; ++i) {
+            std::printf("  %zu.%zu %.3f %.3f\n", i / 2, i % 2, bias[i].real(), bias[i].imag());
+        }
+    }
+}
