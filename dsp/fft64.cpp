@@ -16,52 +16,95 @@ using namespace radix8;
 /// bias away. For each n, quarters of a step of the first pass's result.
 constexpr std::array<std::int32_t, 8> kBias{6, 2, 0, 0, 0, 0, 0, 0};
 
-/// What the first pass needs for samples n, n + 8 ..
+/// What the first pass needs for samples n, n + 8 .., in the order it is read; w(k) = exp(-j 2 pi n k / 64).
 struct Column {
-    /// exp(-j 2 pi n k / 64) for k = 0, 4, 1, 5, 2, 6, 3, 7: as radix8 gives its results
-    std::array<Pair, 8> twiddle;
-    std::int32_t rounding;  ///< of the rotations
+    Pair rounding;                           ///< of the rotations
+    std::array<Pair, 3> even;                ///< w(4), w(2), w(6)
+    std::array<std::array<Pair, 2>, 4> odd;  ///< w(k) and w(k) turned by k eighths, k = 1, 5, 3, 7
 };
 
-constexpr auto kColumns = [] {
+alignas(8) constexpr auto kColumns = [] {
     std::array<Column, 8> columns{};
     for (int n = 0; n < 8; ++n) {
         Column& column = columns[static_cast<std::size_t>(n)];
-        column.rounding = kHalf + kBias[static_cast<std::size_t>(n)] * (1 << 14);
-        for (int i = 0; i < 8; ++i) {
-            column.twiddle[static_cast<std::size_t>(i)] = root(n * (i / 2 + i % 2 * 4));
-        }
+        column.rounding = static_cast<Pair>(kHalf + kBias[static_cast<std::size_t>(n)] * (1 << 14));
+        column.even = {root(4 * n), root(2 * n), root(6 * n)};
+        std::size_t i = 0;
+        for (const int k : {1, 5, 3, 7}) column.odd[i++] = {root(n * k), root((n + 8) * k)};
     }
     return columns;
 }();
+constexpr Pair kOne = root(0);
 
 }  // namespace
 
 void fft64(std::span<Complex16, kFftLength> data) {
-    alignas(8) std::array<Pair, kFftLength> work;  // [n][i], i as in Column
-    Pair* to = work.data();
+    using namespace packed;
+    alignas(8) std::array<Pair, kFftLength> rows;  // [k][n]
+    Pair* to = rows.data();
     const Complex16* from = data.data();
-    for (const Column& column : kColumns) {
-        transform<Halving::none>([from](std::size_t m) { return load(from[8 * m]); },
-                      [to, &column](std::size_t k, Pair low, Pair high) {
-                          const Pair lower = rotate(low, column.twiddle[2 * k], column.rounding);
-                          const Pair upper = rotate(high, column.twiddle[2 * k + 1], column.rounding);
-                          to[2 * k] = lower;
-                          to[2 * k + 1] = upper;
-                      });
-        to += 8;
+    const Pair* factors = &kColumns[0].rounding;
+    do {
+        const auto x = [&from](std::size_t m) { return load(from[8 * m]); };
+        const Pair x0 = x(0);
+        const Pair x4 = x(4);
+        const Pair a0 = saturated_add(x0, x4);
+        const Pair a1 = saturated_sub(x0, x4);
+        const Pair x2 = x(2);
+        const Pair x6 = x(6);
+        const Pair a2 = saturated_add(x2, x6);
+        const Pair a3 = saturated_sub(x2, x6);
+        const Pair even0 = add(a0, a2);
+        const Pair even2 = sub(a0, a2);
+        const Pair even1 = sub_j(a1, a3);
+        const Pair even3 = add_j(a1, a3);
+        const Pair x1 = x(1);
+        const Pair x5 = x(5);
+        const Pair b0 = saturated_add(x1, x5);
+        const Pair b1 = saturated_sub(x1, x5);
+        const Pair x3 = x(3);
+        const Pair x7 = x(7);
+        const Pair b2 = saturated_add(x3, x7);
+        const Pair b3 = saturated_sub(x3, x7);
+        const Pair odd0 = add(b0, b2);
+        const Pair odd2 = sub(b0, b2);
+        const Pair odd1 = sub_j(b1, b3);
+        const Pair odd3 = add_j(b1, b3);
         ++from;
-    }
-    for (std::size_t half = 0; half < 2; ++half) {
-        for (std::size_t k = 0; k < 4; ++k) {
-            Complex16* const out = &data[4 * half + k];
-            transform<Halving::second_and_third>([row = &work[2 * k + half]](std::size_t n) { return row[8 * n]; },
-                         [out](std::size_t q, Pair low, Pair high) {
-                             out[8 * q] = std::bit_cast<Complex16>(low);
-                             out[8 * q + 32] = std::bit_cast<Complex16>(high);
-                         });
-        }
-    }
+        Pair first = 0;
+        Pair second = 0;
+        take_pair(factors, first, second);
+        const auto rounding = static_cast<std::int32_t>(first);
+        to[0] = rotate(saturated_add(even0, odd0), kOne, rounding);
+        to[8 * 4] = rotate(saturated_sub(even0, odd0), second, rounding);
+        take_pair(factors, first, second);
+        to[8 * 2] = rotate(saturated_sub_j(even2, odd2), first, rounding);
+        to[8 * 6] = rotate(saturated_add_j(even2, odd2), second, rounding);
+        const auto rotate_sum = [&](Pair even, Pair odd) {
+            Pair w = 0;
+            Pair turned = 0;
+            take_pair(factors, w, turned);
+            return pack_high(dot_minus(odd, turned, dot_minus(even, w, rounding)),
+                             dot_cross(odd, turned, dot_cross(even, w, rounding)));
+        };
+        to[8 * 1] = rotate_sum(even1, odd1);
+        to[8 * 5] = rotate_sum(even1, odd1);
+        to[8 * 3] = rotate_sum(even3, odd3);
+        to[8 * 7] = rotate_sum(even3, odd3);
+        ++to;
+    } while (to != rows.data() + 8);
+    const Pair* row = rows.data();
+    Complex16* out = data.data();
+    do {
+        const auto x = load_8(row);
+        transform<Halving::second_and_third>([&x](std::size_t n) { return x[n]; },
+                                             [out](std::size_t q, Pair low, Pair high) {
+                                                 out[8 * q] = std::bit_cast<Complex16>(low);
+                                                 out[8 * q + 32] = std::bit_cast<Complex16>(high);
+                                             });
+        row += 8;
+        ++out;
+    } while (row != rows.data() + kFftLength);
 }
 
 }  // namespace dsp

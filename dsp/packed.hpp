@@ -3,6 +3,7 @@
 /// Complex16.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -170,6 +171,11 @@ void store_pair(T* to, Pair first, Pair second) {
     std::memcpy(static_cast<void*>(to), &first, sizeof first);
     std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
 }
+inline std::array<Pair, 8> load_8(const Pair* from) {
+    std::array<Pair, 8> words;
+    std::memcpy(words.data(), from, sizeof words);
+    return words;
+}
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {
     load_pair(from, first, second);
     from += 2;
@@ -335,6 +341,21 @@ inline std::uint32_t multiply_add(std::uint32_t a, std::uint32_t b, std::uint32_
     std::uint32_t result;
     asm("mla %0, %1, %2, %3" : "=r"(result) : "r"(a), "r"(b), "r"(sum));
     return result;
+}
+/// Eight words next to each other. The compiler uses such an instruction for copies only.
+inline std::array<Pair, 8> load_8(const Pair* from) {
+    register Pair a asm("r4");
+    register Pair b asm("r5");
+    register Pair c asm("r6");
+    register Pair d asm("r8");
+    register Pair e asm("r9");
+    register Pair f asm("r10");
+    register Pair g asm("r11");
+    register Pair h asm("r12");
+    asm("ldmia %8, {r4, r5, r6, r8, r9, r10, r11, r12}"
+        : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h)
+        : "r"(from), "m"(*reinterpret_cast<const std::array<Pair, 8>*>(from)));
+    return {a, b, c, d, e, f, g, h};
 }
 /// The next two of a table, in words.
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {

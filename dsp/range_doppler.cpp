@@ -101,10 +101,17 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
                      Spectrum& spectrum) {
     const int guard = guard_bits(window);
     const RangeWindow weights(window);
+    // The Rudin-Shapiro sequence, whose spectrum is flat: no velocity gets more of the bias than others.
+    constexpr std::uint32_t kDither = 0x4748B848;
     for (std::size_t k = 0; k < kChirps; k += 2) {
         const int exponent = levels.exponent[k / 2] + guard;
-        range_fft({frame.chirp[k].data(), {levels.sum[k], levels.sum[k + 1]}, exponent}, weights,
-                  &spectrum.row[0][k]);
+        const packed::Pair dither = kDither >> (k / 2) & 1U;
+        const packed::Pair alternating = k / 2 % 2;
+        range_fft({frame.chirp[k].data(),
+                   {levels.sum[k], levels.sum[k + 1]},
+                   exponent,
+                   {dither, dither ^ alternating}},
+                  weights, &spectrum.row[0][k]);
         spectrum.chirp_exponent[k / 2] = static_cast<std::int16_t>(exponent + kRangeFftExponent);
     }
 }

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstddef>
 
+#include "dsp/dc_removal.hpp"
 #include "dsp/fixed_point.hpp"
 #include "dsp/radix8.hpp"
 
@@ -12,10 +13,9 @@ namespace {
 
 using namespace radix8;
 
-constexpr int kMeanBits = 6;
-static_assert(kSamples == 1 << kMeanBits && kSamples == kFftLength);
-/// Deviations get 14 bits, so that what the lanes of a word take from each other is little; the window gives
-/// two of them up again.
+static_assert(kSamples == kFftLength);
+/// Deviations get 14 bits, so that what the lanes of a word take from each other is little; the Q14 window
+/// and the upper halves of the products give two of them up again.
 constexpr int kHighestExponent = 2;
 
 /// What the first pass needs for cells both chirps share; exp(-j 2 pi 4 n / 64) = c - j s.
@@ -49,7 +49,9 @@ constexpr auto kSharedColumns = [] {
 /// Between the passes: for each chirp rows of 8, first cells 0, 8 .., then 1, 9 .., 2, 10 .. and 3, 11 ..
 using Rows = std::array<Pair, kFftLength>;
 
-/// Of one chirp. Its row 0 gets the sums of samples with even and with odd m.
+/// Of one chirp. A word is sample n + 32 times 2^16 plus sample n, as a sum: where the latter is negative, it
+/// takes one from the upper lane, half a step on average, which dither in dc turns. Row 0 gets the sums of
+/// samples with even and with odd m.
 void first_pass(const std::int16_t* x, Pair gain, Pair dc, const RangeWindow& window, Pair* to) {
     using namespace packed;
     const Pair* table = window.columns()->weight.data();
@@ -151,13 +153,13 @@ void second_pass(const Rows& rows, Complex16* out) {
     for (std::size_t chirp = 0; chirp < 2; ++chirp) {
         for (std::size_t k = 1; k < 4; ++k) {
             row += 8;
-            transform<Halving::second>(
-                [row](std::size_t n) { return row[n]; },
-                [low_to = out + kFftLength * k, high_to = out + kFftLength * (32 - k)](
-                    std::size_t q, Pair low, Pair high) {
-                    low_to[kFftLength * 8 * q] = std::bit_cast<Complex16>(low);
-                    *(high_to - kFftLength * 8 * q) = conjugate(high);
-                });
+            const auto x = packed::load_8(row);
+            transform<Halving::second>([&x](std::size_t n) { return x[n]; },
+                                       [low_to = out + kFftLength * k, high_to = out + kFftLength * (32 - k)](
+                                           std::size_t q, Pair low, Pair high) {
+                                           low_to[kFftLength * 8 * q] = std::bit_cast<Complex16>(low);
+                                           *(high_to - kFftLength * 8 * q) = conjugate(high);
+                                       });
         }
         row += 8;
         ++out;
@@ -187,16 +189,17 @@ void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* ou
         const std::int32_t sum = chirps.sum[chirp];
         const int up = kHighestExponent - chirps.exponent;
         Pair* const to = &rows[kFftLength / 2 * chirp];
+        const Pair dither = chirps.dither[chirp] << 16;
         if (up < 0) {
             std::array<std::int16_t, kSamples> scaled;
             for (std::size_t n = 0; n < kSamples; ++n) {
                 scaled[n] = static_cast<std::int16_t>(round_shift(kSamples * x[n] - sum, kMeanBits - up));
             }
-            first_pass(scaled.data(), 1, 0, window, to);
+            first_pass(scaled.data(), 1, dither, window, to);
         } else {
             const int mean_up = up - kMeanBits;
             const std::int32_t mean = mean_up >= 0 ? sum * (1 << mean_up) : round_shift(sum, -mean_up);
-            first_pass(x, Pair{1} << up, static_cast<Pair>(-mean) * 0x10001U, window, to);
+            first_pass(x, Pair{1} << up, dither - static_cast<Pair>(mean) * 0x10001U, window, to);
         }
     }
     share(rows);

@@ -10,7 +10,7 @@ namespace target {
 
 enum class Stage : std::uint8_t {
     input_check,  ///< dead, stuck, clipped frames; noise level
-    range_fft,  ///< with DC removal and window
+    range_fft,    ///< with DC removal and window
     doppler_fft,
     window_power,  ///< Doppler window, log power: range-Doppler transform less the two above
     cfar,          ///< local maxima and OS-CFAR
@@ -24,9 +24,8 @@ enum class Stage : std::uint8_t {
 };
 inline constexpr std::size_t kStages = static_cast<std::size_t>(Stage::count_);
 inline constexpr std::array<std::string_view, kStages> kStageNames{
-    "input check",      "range fft", "doppler fft",
-    "window and power", "cfar",       "peaks",     "association",
-    "filter",           "warning",    "can",       "rest"};
+    "input check", "range fft", "doppler fft", "window and power", "cfar", "peaks", "association", "filter",
+    "warning",     "can",       "rest"};
 
 /// Of one cycle.
 extern std::array<std::uint32_t, kStages> stage_instructions;
