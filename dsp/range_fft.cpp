@@ -20,8 +20,8 @@ constexpr int kHighestExponent = 2;
 
 /// What the first pass needs for cells both chirps share; exp(-j 2 pi 4 n / 64) = c - j s.
 struct SharedColumn {
+    Pair rounding;
     std::array<Pair, 3> root;  ///< c, s and -s, twice each
-    std::int32_t rounding;
 };
 
 /// Halving rounds down, which leaves a bias; small impulses at the input of the second pass take it away, as
@@ -34,14 +34,14 @@ constexpr auto kRoots = [] {
     for (int n = 0; n < 8; ++n) roots[static_cast<std::size_t>(n)] = {root(n), root(3 * n), root(2 * n)};
     return roots;
 }();
-constexpr auto kSharedColumns = [] {
+alignas(8) constexpr auto kSharedColumns = [] {
     std::array<SharedColumn, 8> columns{};
     for (int n = 0; n < 8; ++n) {
         const auto i = static_cast<std::size_t>(n);
         const std::int32_t c = packed::lane0(root(4 * n));
         const std::int32_t s = -packed::lane1(root(4 * n));
-        columns[i] = {{packed::pack(c, c), packed::pack(s, s), packed::pack(-s, -s)},
-                      kHalf + kPairBias[i] * (1 << 14)};
+        columns[i] = {static_cast<Pair>(kHalf + kPairBias[i] * (1 << 14)),
+                      {packed::pack(c, c), packed::pack(s, s), packed::pack(-s, -s)}};
     }
     return columns;
 }();
@@ -108,15 +108,20 @@ void first_pass(const std::int16_t* x, Pair gain, Pair dc, const RangeWindow& wi
 void share(Rows& rows) {
     using namespace packed;
     constexpr Pair kOne = pack(32767, 32767);
-    Pair* to = rows.data();
-    for (const auto& [root, rounding] : kSharedColumns) {
+    const Pair* table = &kSharedColumns[0].rounding;
+    for (Pair* to = rows.data(); to != rows.data() + 8; ++to) {
+        Pair first = 0;
+        Pair c = 0;
+        take_pair(table, first, c);
+        Pair s = 0;
+        Pair minus_s = 0;
+        take_pair(table, s, minus_s);
+        const auto rounding = static_cast<std::int32_t>(first);
         const Pair even = to[0];
         const Pair odd = to[32];
-        const auto& [c, s, minus_s] = root;
         to[0] = pack_high(dot(even, kOne, rounding), dot(odd, kOne, rounding));
         to[32] = pack_high(dot_minus(odd, s, dot_minus(even, c, rounding)),
                            dot_minus(odd, c, dot_minus(even, minus_s, rounding)));
-        ++to;
     }
 }
 
@@ -127,8 +132,9 @@ inline Complex16 conjugate(Pair z) {
 /// Cells kFirst + 8 q of both chirps, whose transforms are the parts of one.
 template <std::size_t kFirst>
 void shared_cells(const Pair* row, Complex16* out) {
-    std::array<Pair, 8> z{};
-    transform<Halving::second_and_third>([row](std::size_t n) { return row[n]; },
+    std::array<Pair, 8> z;
+    const auto x = packed::load_8(row);
+    transform<Halving::second_and_third>([&x](std::size_t n) { return x[n]; },
                                          [&z](std::size_t q, Pair low, Pair high) {
                                              z[q] = low;
                                              z[q + 4] = high;
@@ -171,37 +177,48 @@ void second_pass(const Rows& rows, Complex16* out) {
 RangeWindow::RangeWindow(const Window& window) {
     constexpr std::int32_t kCosine45 = 23170;  // Q15
     for (std::size_t n = 0; n < 8; ++n) {
-        const auto weights = [&window, n](std::size_t m, std::int32_t scale) {
-            const auto weight = [&](std::size_t i) { return round_shift(window[i] * scale, 16); };
-            return packed::pack(weight(n + 8 * m), weight(n + 8 * m + 32));
+        const auto weights = [w = &window[n]](std::size_t m, std::int32_t scale) {
+            return packed::pack_high(w[8 * m] * scale + kHalf, w[8 * m + 32] * scale + kHalf);
         };
-        columns_[n] = {{weights(0, 1 << 15), weights(2, 1 << 15), weights(1, 1 << 15), weights(1, kCosine45),
-                        weights(3, 1 << 15), weights(3, kCosine45)},
-                       {kRoots[n][0], kRoots[n][1], kRoots[n][2]},
+        constexpr std::int32_t kWhole = 1 << 15;
+        columns_[n] = {{weights(0, kWhole), weights(2, kWhole), weights(1, kWhole), weights(1, kCosine45),
+                        weights(3, kWhole), weights(3, kCosine45)},
+                       kRoots[n],
                        static_cast<Pair>(kHalf + kBias[n] * (1 << 14))};
     }
 }
 
+namespace {
+
+/// For deviations that need more than the 16 bits of a lane.
+[[gnu::noinline]] void first_pass_scaled_down(const std::int16_t* x, std::int32_t sum, int down, Pair dither,
+                                              const RangeWindow& window, Pair* to) {
+    std::array<std::int16_t, kSamples> scaled;
+    for (std::size_t n = 0; n < kSamples; ++n) {
+        scaled[n] = static_cast<std::int16_t>(round_shift(kSamples * x[n] - sum, kMeanBits + down));
+    }
+    first_pass(scaled.data(), 1, dither, window, to);
+}
+
+}  // namespace
+
 void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* out) {
     Rows rows;
-    for (std::size_t chirp = 0; chirp < 2; ++chirp) {
-        const std::int16_t* x = chirps.samples + kSamples * chirp;
-        const std::int32_t sum = chirps.sum[chirp];
-        const int up = kHighestExponent - chirps.exponent;
-        Pair* const to = &rows[kFftLength / 2 * chirp];
-        const Pair dither = chirps.dither[chirp] << 16;
+    const int up = kHighestExponent - chirps.exponent;
+    const auto chirp = [&](std::size_t i, Pair* to) {
+        const std::int16_t* const x = chirps.samples + kSamples * i;
+        const std::int32_t sum = chirps.sum[i];
+        const Pair dither = chirps.dither[i] << 16;
         if (up < 0) {
-            std::array<std::int16_t, kSamples> scaled;
-            for (std::size_t n = 0; n < kSamples; ++n) {
-                scaled[n] = static_cast<std::int16_t>(round_shift(kSamples * x[n] - sum, kMeanBits - up));
-            }
-            first_pass(scaled.data(), 1, dither, window, to);
+            first_pass_scaled_down(x, sum, -up, dither, window, to);
         } else {
-            const int mean_up = up - kMeanBits;
-            const std::int32_t mean = mean_up >= 0 ? sum * (1 << mean_up) : round_shift(sum, -mean_up);
+            const std::int32_t mean = up < kMeanBits ? (sum + (kSamples >> up >> 1)) >> (kMeanBits - up)
+                                                     : sum * (1 << (up - kMeanBits));
             first_pass(x, Pair{1} << up, dither - static_cast<Pair>(mean) * 0x10001U, window, to);
         }
-    }
+    };
+    chirp(0, rows.data());
+    chirp(1, &rows[kFftLength / 2]);
     share(rows);
     second_pass(rows, out);
 }
