@@ -51,12 +51,4 @@ constexpr int deviation_exponent(const ChirpLevel& even, const ChirpLevel& odd) 
 /// everywhere.
 void share_exponent(std::span<std::int16_t, kChirps / 2> exponent);
 
-/// out[n] = window[n] (even[n] - its mean + j (odd[n] - its mean)) / 2^exponent for two chirps with the given
-/// sums. The mean is not rounded by more than 1/256 of the step, the result is rounded down: half a step too
-/// low on average. Cannot overflow for an exponent not below that of the pair, -11..5. Cost: about 7
-/// instructions a sample of out for exponents below 2, more above.
-void remove_dc(std::span<const std::int16_t, kSamples> even, std::int32_t even_sum,
-               std::span<const std::int16_t, kSamples> odd, std::int32_t odd_sum, int exponent,
-               const Window& window, std::span<Complex16, kFftLength> out);
-
 }  // namespace dsp

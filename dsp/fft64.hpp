@@ -35,11 +35,4 @@ inline constexpr int kFftInputBits = 12;
 inline constexpr int kFftExponent = 3;
 void fft64(std::span<Complex16, kFftLength> data);
 
-/// Two real sequences with one transform of z = a + j b, which is overwritten: for the lower half of the
-/// cells A[k] = (Z[k] + conj Z[64-k]) / 2 to ab[64 k] and B[k] = (Z[k] - conj Z[64-k]) / 2j to the element
-/// after it, two columns of a matrix with rows of 64, both in units of 2^kFftPairExponent: with a window as
-/// above, the sums fit without the division by two. `ab` has at least 31 * 64 + 2 elements.
-inline constexpr int kFftPairExponent = kFftExponent - 1;
-void fft64_real_pair(std::span<Complex16, kFftLength> z, Complex16* ab);
-
 }  // namespace dsp

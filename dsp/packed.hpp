@@ -106,6 +106,9 @@ constexpr Pair pack_low(std::int32_t lane_0, std::int32_t lane_1) {
 constexpr Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
     return pack(lane_0 >> 16, lane_1 >> 16);
 }
+constexpr Pair pack_mixed(Pair low_from, Pair high_from) {
+    return pack(lane0(low_from), lane1(high_from));
+}
 constexpr Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
     return pack(lane_0 >> 15, lane_1 >> 15);
 }
@@ -138,6 +141,9 @@ constexpr std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
 constexpr std::int32_t dot_cross(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane1(b)) + product(lane1(a), lane0(b)) + sum);
 }
+constexpr std::int32_t dot_cross_minus(Pair a, Pair b, std::int32_t sum) {
+    return wrap(product(lane0(a), lane1(b)) - product(lane1(a), lane0(b)) + sum);
+}
 constexpr std::int32_t multiply_00(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) + sum);
 }
@@ -155,6 +161,12 @@ constexpr std::int32_t scale_0(std::int32_t a, Pair b) {
 }
 constexpr std::int32_t scale_1(std::int32_t a, Pair b) {
     return static_cast<std::int32_t>(product(a, lane1(b)) >> 16);
+}
+constexpr std::uint32_t add_shifted(std::uint32_t a, std::uint32_t b) {
+    return a + (b << 16);
+}
+constexpr std::uint32_t multiply_add(std::uint32_t a, std::uint32_t b, std::uint32_t sum) {
+    return a * b + sum;
 }
 constexpr Pair floored_sub(Pair a, Pair b) {
     const auto lane = [](Pair x, Pair y) { return x > y ? x - y : 0U; };
@@ -195,6 +207,15 @@ void store_pair(T* to, Pair first, Pair second) {
     static_assert(4 % sizeof(T) == 0);
     std::memcpy(static_cast<void*>(to), &first, sizeof first);
     std::memcpy(static_cast<void*>(to + sizeof first / sizeof(T)), &second, sizeof second);
+}
+inline std::array<Pair, 8> load_8(const Pair* from) {
+    std::array<Pair, 8> words;
+    std::memcpy(words.data(), from, sizeof words);
+    return words;
+}
+inline void take_pair(const Pair*& from, Pair& first, Pair& second) {
+    load_pair(from, first, second);
+    from += 2;
 }
 }  // namespace portable
 
@@ -262,6 +283,12 @@ inline Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
     asm("pkhtb %0, %1, %2, asr #16" : "=r"(result) : "r"(lane_1), "r"(lane_0));
     return result;
 }
+/// Lane 0 of one, lane 1 of the other.
+inline Pair pack_mixed(Pair low_from, Pair high_from) {
+    Pair result;
+    asm("pkhbt %0, %1, %2" : "=r"(result) : "r"(low_from), "r"(high_from));
+    return result;
+}
 /// The high halves of two words' doubles.
 inline Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
     Pair result;
@@ -307,6 +334,10 @@ inline std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
 /// sum + a0 b1 + a1 b0
 inline std::int32_t dot_cross(Pair a, Pair b, std::int32_t sum) {
     return __smladx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
+}
+/// sum + a0 b1 - a1 b0
+inline std::int32_t dot_cross_minus(Pair a, Pair b, std::int32_t sum) {
+    return __smlsdx(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
 }
 /// sum + a0 b0, sum + a1 b0 and so on
 inline std::int32_t multiply_00(Pair a, Pair b, std::int32_t sum) {
@@ -409,6 +440,37 @@ void store_pair(T* to, Pair first, Pair second) {
     static_assert(4 % sizeof(T) == 0);
     using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
     asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
+}
+/// a + 2^16 b in 32 bits: the compiler makes three instructions of it when a product follows.
+inline std::uint32_t add_shifted(std::uint32_t a, std::uint32_t b) {
+    std::uint32_t result;
+    asm("add %0, %1, %2, lsl #16" : "=r"(result) : "r"(a), "r"(b));
+    return result;
+}
+/// a b + sum in 32 bits. The compiler adds what sums share first, and one instruction becomes two.
+inline std::uint32_t multiply_add(std::uint32_t a, std::uint32_t b, std::uint32_t sum) {
+    std::uint32_t result;
+    asm("mla %0, %1, %2, %3" : "=r"(result) : "r"(a), "r"(b), "r"(sum));
+    return result;
+}
+/// Eight words next to each other. The compiler uses such an instruction for copies only.
+inline std::array<Pair, 8> load_8(const Pair* from) {
+    register Pair a asm("r4");
+    register Pair b asm("r5");
+    register Pair c asm("r6");
+    register Pair d asm("r8");
+    register Pair e asm("r9");
+    register Pair f asm("r10");
+    register Pair g asm("r11");
+    register Pair h asm("r12");
+    asm("ldmia %8, {r4, r5, r6, r8, r9, r10, r11, r12}"
+        : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h)
+        : "r"(from), "m"(*reinterpret_cast<const std::array<Pair, 8>*>(from)));
+    return {a, b, c, d, e, f, g, h};
+}
+/// The next two of a table, in words.
+inline void take_pair(const Pair*& from, Pair& first, Pair& second) {
+    asm("ldrd %0, %1, [%2], #8" : "=&r"(first), "=&r"(second), "+r"(from) : : "memory");
 }
 #else
 using namespace portable;

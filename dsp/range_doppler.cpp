@@ -9,6 +9,7 @@
 #include "dsp/frame_quality.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
+#include "dsp/range_fft.hpp"
 #include "dsp/unrolled.hpp"
 
 namespace dsp {
@@ -103,17 +104,19 @@ static_assert(kChirps == kFftLength);
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum) {
     const int guard = guard_bits(window);
-    for (std::size_t pair = 0; pair < kChirps / 2; ++pair) {
-        const std::size_t k = 2 * pair;
-        const int exponent = levels.exponent[pair] + guard;
-        Spectrum64 z;
-        remove_dc(frame.chirp[k], levels.sum[k], frame.chirp[k + 1], levels.sum[k + 1], exponent, window, z);
-        fft64_real_pair(z, &spectrum.row[0][k]);
-        // remove_dc rounds down: half a step in each of 64 samples is eight in the sum, and in cell 0 alone.
-        for (std::size_t i = k; i < k + 2; ++i) {
-            spectrum.row[0][i].re = static_cast<std::int16_t>(spectrum.row[0][i].re + 8);
-        }
-        spectrum.chirp_exponent[pair] = static_cast<std::int16_t>(exponent + kFftPairExponent);
+    const RangeWindow weights(window);
+    // The Rudin-Shapiro sequence, whose spectrum is flat: no velocity gets more of the bias than others.
+    constexpr std::uint32_t kDither = 0x4748B848;
+    for (std::size_t k = 0; k < kChirps; k += 2) {
+        const int exponent = levels.exponent[k / 2] + guard;
+        const packed::Pair dither = kDither >> (k / 2) & 1U;
+        const packed::Pair alternating = k / 2 % 2;
+        range_fft({frame.chirp[k].data(),
+                   {levels.sum[k], levels.sum[k + 1]},
+                   exponent,
+                   {dither, dither ^ alternating}},
+                  weights, &spectrum.row[0][k]);
+        spectrum.chirp_exponent[k / 2] = static_cast<std::int16_t>(exponent + kRangeFftExponent);
     }
 }
 

@@ -38,7 +38,7 @@ SCENARIOS = sorted(p.stem for p in (ROOT / "host_sim" / "scenarios").glob("*.jso
 PERIOD_S = 0.1
 MAP_CELLS = 30 * 64  # tested by CFAR: the first two of 32 range cells hold leakage
 CHIRPS = 64
-SIGNAL_PROCESSING = ["dc removal", "range fft", "doppler fft", "window and power", "cfar", "peaks"]
+SIGNAL_PROCESSING = ["range fft", "doppler fft", "window and power", "cfar", "peaks"]
 
 
 class Board:

@@ -125,30 +125,6 @@ TEST(Fft64, NoiseIsAsStatedAndBiasNone) {
     for (const Complex& b : bias) CHECK(std::abs(b.real()) < 0.04 && std::abs(b.imag()) < 0.04);
 }
 
-TEST(Fft64, RealPairsComeApart) {
-    for (int t = 0; t < 100; ++t) {
-        for (std::size_t n = 0; n < 64; ++n) set(n, draw(), draw() / (t + 1));
-        std::array<Complex, 64> x;
-        std::array<Complex, 64> y;
-        for (std::size_t n = 0; n < 64; ++n) {
-            x[n] = data[n].re;
-            y[n] = data[n].im;
-        }
-        const auto a = bench::dft64(x);
-        const auto b = bench::dft64(y);
-        std::array<dsp::Complex16, 32 * 64> ab{};
-        dsp::fft64_real_pair(data, ab.data());
-        const double unit = std::ldexp(1.0, -dsp::kFftPairExponent);
-        for (std::size_t k = 0; k < 32; ++k) {
-            DOUBLES_EQUAL(a[k].real() * unit, ab[64 * k].re, 3.4);
-            DOUBLES_EQUAL(a[k].imag() * unit, ab[64 * k].im, 3.4);
-            DOUBLES_EQUAL(b[k].real() * unit, ab[64 * k + 1].re, 3.4);
-            DOUBLES_EQUAL(b[k].imag() * unit, ab[64 * k + 1].im, 3.4);
-            CHECK(ab[64 * k + 2] == dsp::Complex16{});
-        }
-    }
-}
-
 TEST(Fft64, AccuracyTable) {
     for (const auto& row : bench::fft_accuracy()) CHECK_TEXT(row.met(), row.what.c_str());
 }

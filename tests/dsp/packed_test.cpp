@@ -81,12 +81,17 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1) + sum), dot(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b0) - product(a1, b1) + sum), dot_minus(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b1) + product(a1, b0) + sum), dot_cross(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a0, b1) - product(a1, b0) + sum), dot_cross_minus(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b0) + sum), multiply_00(a, b, sum));
     LONGS_EQUAL(wrap32(product(a1, b0) + sum), multiply_10(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b1) + sum), multiply_01(a, b, sum));
     LONGS_EQUAL(wrap32(product(a1, b1) + sum), multiply_11(a, b, sum));
     LONGS_EQUAL((product(sum, b0) - (product(sum, b0) & 0xFFFF)) / 65536, scale_0(sum, b));
     LONGS_EQUAL((product(sum, b1) - (product(sum, b1) & 0xFFFF)) / 65536, scale_1(sum, b));
+    const auto bits = [](std::int64_t v) { return static_cast<std::uint32_t>(v & 0xFFFFFFFF); };
+    UNSIGNED_LONGS_EQUAL(bits(product(a0, b0) + sum), multiply_add(bits(a0), bits(b0), bits(sum)));
+    UNSIGNED_LONGS_EQUAL(bits(a0 + product(65536, b1)), add_shifted(bits(a0), bits(b1)));
+    lanes(a0, b1, pack_mixed(a, b));
     lanes(wrap16(sum), wrap16(~sum), pack_low(sum, ~sum));
     lanes(wrap16((product(sum, 2) - (product(sum, 2) & 0xFFFF)) / 65536), wrap16(2 * a1 + (a0 < 0 ? 1 : 0)),
           pack_doubled(sum, static_cast<std::int32_t>(a)));
@@ -165,4 +170,18 @@ TEST(Packed, MagnitudeBitsCoverEveryValue) {
         LONGS_EQUAL(bits, magnitude_bits(spread(pack(v, 0))));
         LONGS_EQUAL(bits, magnitude_bits(spread(pack(0, v))));
     }
+}
+
+TEST(Packed, TablesAreReadInOrder) {
+    alignas(8) std::array<Pair, 9> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) table[i] = 0x10001000U * static_cast<Pair>(i + 1);
+    const Pair* next = &table[1];
+    Pair first = 0;
+    Pair second = 0;
+    take_pair(next, first, second);
+    POINTERS_EQUAL(&table[3], next);
+    UNSIGNED_LONGS_EQUAL(table[1], first);
+    UNSIGNED_LONGS_EQUAL(table[2], second);
+    const auto eight = load_8(&table[1]);
+    for (std::size_t i = 0; i < 8; ++i) UNSIGNED_LONGS_EQUAL(table[i + 1], eight[i]);
 }

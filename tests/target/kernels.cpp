@@ -118,9 +118,6 @@ void fill(std::array<dsp::Spectrum64, kRepeats>& data) {
 void measure_transforms() {
     fill(spectra);
     measure("fft64", kRepeats, [](std::uint32_t i) { dsp::fft64(spectra[i]); });
-    fill(spectra);
-    measure("fft64_real_pair", kRepeats,
-            [](std::uint32_t i) { dsp::fft64_real_pair(spectra[i], workspace.spectrum.row[0].data()); });
 
     const dsp::Window& window = dsp::window(kConfig.range_window);
     dsp::DcLevels levels;

@@ -17,7 +17,7 @@ import tempfile
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "toolchains"))
 import emulator  # noqa: E402
 
-STAGES = ["input check", "dc removal", "range fft", "doppler fft", "window and power", "cfar", "peaks", "association",
+STAGES = ["input check", "range fft", "doppler fft", "window and power", "cfar", "peaks", "association",
           "filter", "warning", "can", "rest"]  # target::kStageNames
 TO_RADAR = {0x431, 0x432}
 STATUS = 0x400  # first frame of every cycle that the radar sends

@@ -10,10 +10,9 @@ namespace target {
 
 enum class Stage : std::uint8_t {
     input_check,  ///< dead, stuck, clipped frames; noise level
-    dc_removal,
-    range_fft,
+    range_fft,    ///< with DC removal and window
     doppler_fft,
-    window_power,  ///< both windows, corner turn, log power: range-Doppler transform less the three above
+    window_power,  ///< Doppler window, log power: range-Doppler transform less the two above
     cfar,          ///< local maxima and OS-CFAR
     peaks,
     association,
@@ -25,9 +24,8 @@ enum class Stage : std::uint8_t {
 };
 inline constexpr std::size_t kStages = static_cast<std::size_t>(Stage::count_);
 inline constexpr std::array<std::string_view, kStages> kStageNames{
-    "input check",      "dc removal", "range fft", "doppler fft",
-    "window and power", "cfar",       "peaks",     "association",
-    "filter",           "warning",    "can",       "rest"};
+    "input check", "range fft", "doppler fft", "window and power", "cfar", "peaks", "association", "filter",
+    "warning",     "can",       "rest"};
 
 /// Of one cycle.
 extern std::array<std::uint32_t, kStages> stage_instructions;

@@ -15,8 +15,7 @@ import sys
 # Order of target::Stage in stages.hpp.
 STAGES = {
     "input check": [r"^dsp::inspect\(", r"^dsp::noise_level\("],
-    "dc removal": [r"^dsp::remove_dc\("],
-    "range fft": [r"^dsp::fft64_real_pair\("],
+    "range fft": [r"^dsp::range_fft\("],
     "doppler fft": [r"^dsp::fft64\("],
     "window and power": [r"^dsp::range_doppler\("],
     "cfar": [r"^dsp::cfar_peaks\("],
