@@ -45,8 +45,8 @@ inline ChirpPass pass_over(const std::array<std::int16_t, kSamples>& chirp) {
     return pass;
 }
 
-/// A polynomial in an odd number, modulo 2^32: what changes one of its coefficients changes it for certain,
-/// what changes several with a chance of all but 2^-32.
+/// A polynomial in an odd number, modulo 2^32: two frames that differ have the same value with a chance of
+/// 2^-32, never if they differ in one coefficient alone.
 std::uint32_t hashed(std::uint32_t hash, const ChirpPass& pass) {
     constexpr std::uint32_t kBase = 0x9E3779B1U;  // 2^32 over the golden ratio
     return ((hash * kBase + static_cast<std::uint32_t>(pass.sum)) * kBase + pass.low) * kBase + pass.high;

@@ -14,8 +14,8 @@ struct FrameQuality {
     std::int16_t max = 0;
     std::uint16_t saturated = 0;  ///< samples at or beyond the converter's full scale, either sign, 0..4096
     std::uint8_t repeated_chirps = 0;  ///< chirps equal to the one before them, sample by sample, 0..63
-    /// Of the sums and extremes of all chirps: two frames in a row with the same one are a stuck converter.
-    /// Any one sample that changes changes it.
+    /// Of the sums and extremes of all chirps: two frames in a row with the same one are a stuck converter. A
+    /// sample that changes changes its chirp's sum; noise leaves none of 64 sums alone.
     std::uint32_t hash = 0;
 
     /// Every sample equal: no noise, no converter.
