@@ -36,40 +36,41 @@ alignas(8) constexpr auto kColumns = [] {
 }();
 constexpr Pair kOne = root(0);
 
-}  // namespace
-
-void fft64(std::span<Complex16, kFftLength> data) {
+/// `data`: Complex16 for one transform, Quad for four.
+template <class Element>
+inline void transform64(Element* data) {
     using namespace packed;
-    alignas(8) std::array<Pair, kFftLength> rows;  // [k][n]
-    Pair* to = rows.data();
-    const Complex16* from = data.data();
+    using Word = decltype(load(*data));
+    alignas(8) std::array<Word, kFftLength> rows;  // [k][n]
+    Word* to = rows.data();
+    const Element* from = data;
     const Pair* factors = &kColumns[0].rounding;
     do {
         const auto x = [&from](std::size_t m) { return load(from[8 * m]); };
-        const Pair x0 = x(0);
-        const Pair x4 = x(4);
-        const Pair a0 = saturated_add(x0, x4);
-        const Pair a1 = saturated_sub(x0, x4);
-        const Pair x2 = x(2);
-        const Pair x6 = x(6);
-        const Pair a2 = saturated_add(x2, x6);
-        const Pair a3 = saturated_sub(x2, x6);
-        const Pair even0 = add(a0, a2);
-        const Pair even2 = sub(a0, a2);
-        const Pair even1 = sub_j(a1, a3);
-        const Pair even3 = add_j(a1, a3);
-        const Pair x1 = x(1);
-        const Pair x5 = x(5);
-        const Pair b0 = saturated_add(x1, x5);
-        const Pair b1 = saturated_sub(x1, x5);
-        const Pair x3 = x(3);
-        const Pair x7 = x(7);
-        const Pair b2 = saturated_add(x3, x7);
-        const Pair b3 = saturated_sub(x3, x7);
-        const Pair odd0 = add(b0, b2);
-        const Pair odd2 = sub(b0, b2);
-        const Pair odd1 = sub_j(b1, b3);
-        const Pair odd3 = add_j(b1, b3);
+        const Word x0 = x(0);
+        const Word x4 = x(4);
+        const Word a0 = saturated_add(x0, x4);
+        const Word a1 = saturated_sub(x0, x4);
+        const Word x2 = x(2);
+        const Word x6 = x(6);
+        const Word a2 = saturated_add(x2, x6);
+        const Word a3 = saturated_sub(x2, x6);
+        const Word even0 = add(a0, a2);
+        const Word even2 = sub(a0, a2);
+        const Word even1 = sub_j(a1, a3);
+        const Word even3 = add_j(a1, a3);
+        const Word x1 = x(1);
+        const Word x5 = x(5);
+        const Word b0 = saturated_add(x1, x5);
+        const Word b1 = saturated_sub(x1, x5);
+        const Word x3 = x(3);
+        const Word x7 = x(7);
+        const Word b2 = saturated_add(x3, x7);
+        const Word b3 = saturated_sub(x3, x7);
+        const Word odd0 = add(b0, b2);
+        const Word odd2 = sub(b0, b2);
+        const Word odd1 = sub_j(b1, b3);
+        const Word odd3 = add_j(b1, b3);
         ++from;
         Pair first = 0;
         Pair second = 0;
@@ -80,7 +81,7 @@ void fft64(std::span<Complex16, kFftLength> data) {
         take_pair(factors, first, second);
         to[8 * 2] = rotate(saturated_sub_j(even2, odd2), first, rounding);
         to[8 * 6] = rotate(saturated_add_j(even2, odd2), second, rounding);
-        const auto rotate_sum = [&](Pair even, Pair odd) {
+        const auto rotate_sum = [&](Word even, Word odd) {
             Pair w = 0;
             Pair turned = 0;
             take_pair(factors, w, turned);
@@ -93,18 +94,39 @@ void fft64(std::span<Complex16, kFftLength> data) {
         to[8 * 7] = rotate_sum(even3, odd3);
         ++to;
     } while (to != rows.data() + 8);
-    const Pair* row = rows.data();
-    Complex16* out = data.data();
+    const Word* row = rows.data();
+    Element* out = data;
     do {
         const auto x = load_8(row);
         transform<Halving::second_and_third>([&x](std::size_t n) { return x[n]; },
-                                             [out](std::size_t q, Pair low, Pair high) {
-                                                 out[8 * q] = std::bit_cast<Complex16>(low);
-                                                 out[8 * q + 32] = std::bit_cast<Complex16>(high);
+                                             [out](std::size_t q, Word low, Word high) {
+                                                 store(out[8 * q], low);
+                                                 store(out[8 * q + 32], high);
                                              });
         row += 8;
         ++out;
     } while (row != rows.data() + kFftLength);
+}
+
+}  // namespace
+
+void fft64(std::span<Complex16, kFftLength> data) {
+    transform64(data.data());
+}
+
+void fft64_rows(std::span<Spectrum64, kFftRows> rows) {
+#if DSP_PACKED_FOUR
+    std::array<packed::Quad, kFftLength> columns;
+    for (std::size_t n = 0; n < kFftLength; n += 4) {
+        packed::load_transposed(&rows[0][n], kFftLength, &columns[n]);
+    }
+    transform64(columns.data());
+    for (std::size_t n = 0; n < kFftLength; n += 4) {
+        packed::store_transposed(&columns[n], &rows[0][n], kFftLength);
+    }
+#else
+    fft64(rows[0]);
+#endif
 }
 
 }  // namespace dsp

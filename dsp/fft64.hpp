@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <span>
 
+#include "dsp/packed_x86.hpp"
+
 namespace dsp {
 
 /// Re and im next to each other, as packed 16-bit arithmetic wants them.
@@ -34,5 +36,9 @@ inline constexpr int kFftInputBits = 12;
 /// the output: 0.16 square steps in each part, no bias. Cost: about 1130 instructions.
 inline constexpr int kFftExponent = 3;
 void fft64(std::span<Complex16, kFftLength> data);
+
+/// As many at once as the machine's words hold, with the same bits: one on a board, four on a PC.
+inline constexpr std::size_t kFftRows = DSP_PACKED_FOUR ? 4 : 1;
+void fft64_rows(std::span<Spectrum64, kFftRows> rows);
 
 }  // namespace dsp

@@ -8,6 +8,7 @@
 
 #include "dsp/fft64.hpp"
 #include "dsp/packed.hpp"
+#include "dsp/packed_x86.hpp"
 #include "dsp/sine.hpp"
 
 namespace dsp::radix8 {
@@ -30,14 +31,31 @@ constexpr Pair kEighth = root(8);
 inline Pair load(const Complex16& x) {
     return std::bit_cast<Pair>(x);
 }
+inline void store(Complex16& to, Pair x) {
+    to = std::bit_cast<Complex16>(x);
+}
+
+#if DSP_PACKED_FOUR
+using packed::Quad;
+inline Quad load(Quad x) {
+    return x;
+}
+inline void store(Quad& to, Quad x) {
+    to = x;
+}
+#endif
+
+// Word: a Pair, or on a PC a Quad, for four transforms at once.
 
 /// a w / 2, rounded.
-inline Pair rotate(Pair a, Pair w, std::int32_t rounding = kHalf) {
+template <class Word>
+Word rotate(Word a, Pair w, std::int32_t rounding = kHalf) {
     return packed::pack_high(packed::dot_minus(a, w, rounding), packed::dot_cross(a, w, rounding));
 }
 
 /// a w, rounded.
-inline Pair rotate_whole(Pair a, Pair w) {
+template <class Word>
+Word rotate_whole(Word a, Pair w) {
     constexpr std::int32_t kQuarter = kHalf / 2;
     return packed::pack_doubled(packed::dot_minus(a, w, kQuarter), packed::dot_cross(a, w, kQuarter));
 }
@@ -50,38 +68,39 @@ enum class Halving : std::uint8_t { none, second, second_and_third };
 template <Halving kHalving, class Load, class Emit>
 inline void transform(Load x, Emit emit) {
     using namespace packed;
+    using Word = decltype(x(0));
     constexpr bool kSecond = kHalving != Halving::none;
     constexpr bool kThird = kHalving == Halving::second_and_third;
-    const Pair x0 = x(0);
-    const Pair x4 = x(4);
-    const Pair a0 = saturated_add(x0, x4);
-    const Pair a1 = saturated_sub(x0, x4);
-    const Pair x2 = x(2);
-    const Pair x6 = x(6);
-    const Pair a2 = saturated_add(x2, x6);
-    const Pair a3 = saturated_sub(x2, x6);
-    const Pair even0 = kSecond ? half_add(a0, a2) : add(a0, a2);
-    const Pair even2 = kSecond ? half_sub(a0, a2) : sub(a0, a2);
-    const Pair even1 = kSecond ? half_sub_j(a1, a3) : sub_j(a1, a3);
-    const Pair even3 = kSecond ? half_add_j(a1, a3) : add_j(a1, a3);
-    const Pair x1 = x(1);
-    const Pair x5 = x(5);
-    const Pair b0 = saturated_add(x1, x5);
-    const Pair b1 = saturated_sub(x1, x5);
-    const Pair x3 = x(3);
-    const Pair x7 = x(7);
-    const Pair b2 = saturated_add(x3, x7);
-    const Pair b3 = saturated_sub(x3, x7);
-    const Pair odd0 = kSecond ? half_add(b0, b2) : add(b0, b2);
-    const Pair odd2 = kSecond ? half_sub(b0, b2) : sub(b0, b2);
-    const auto last = [&emit](std::size_t k, Pair a, Pair b) {
+    const Word x0 = x(0);
+    const Word x4 = x(4);
+    const Word a0 = saturated_add(x0, x4);
+    const Word a1 = saturated_sub(x0, x4);
+    const Word x2 = x(2);
+    const Word x6 = x(6);
+    const Word a2 = saturated_add(x2, x6);
+    const Word a3 = saturated_sub(x2, x6);
+    const Word even0 = kSecond ? half_add(a0, a2) : add(a0, a2);
+    const Word even2 = kSecond ? half_sub(a0, a2) : sub(a0, a2);
+    const Word even1 = kSecond ? half_sub_j(a1, a3) : sub_j(a1, a3);
+    const Word even3 = kSecond ? half_add_j(a1, a3) : add_j(a1, a3);
+    const Word x1 = x(1);
+    const Word x5 = x(5);
+    const Word b0 = saturated_add(x1, x5);
+    const Word b1 = saturated_sub(x1, x5);
+    const Word x3 = x(3);
+    const Word x7 = x(7);
+    const Word b2 = saturated_add(x3, x7);
+    const Word b3 = saturated_sub(x3, x7);
+    const Word odd0 = kSecond ? half_add(b0, b2) : add(b0, b2);
+    const Word odd2 = kSecond ? half_sub(b0, b2) : sub(b0, b2);
+    const auto last = [&emit](std::size_t k, Word a, Word b) {
         emit(k, kThird ? half_add(a, b) : saturated_add(a, b), kThird ? half_sub(a, b) : saturated_sub(a, b));
     };
-    const auto last_j = [&emit](std::size_t k, Pair a, Pair b) {
+    const auto last_j = [&emit](std::size_t k, Word a, Word b) {
         emit(k, kThird ? half_sub_j(a, b) : saturated_sub_j(a, b),
              kThird ? half_add_j(a, b) : saturated_add_j(a, b));
     };
-    const auto eighth = [](Pair sum, Pair halved_sum) {
+    const auto eighth = [](Word sum, Word halved_sum) {
         if constexpr (kHalving == Halving::second) return rotate(sum, kEighth);
         return rotate_whole(kSecond ? halved_sum : sum, kEighth);
     };

@@ -107,16 +107,20 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
     const RangeWindow weights(window);
     // The Rudin-Shapiro sequence, whose spectrum is flat: no velocity gets more of the bias than others.
     constexpr std::uint32_t kDither = 0x4748B848;
-    for (std::size_t k = 0; k < kChirps; k += 2) {
-        const int exponent = levels.exponent[k / 2] + guard;
-        const packed::Pair dither = kDither >> (k / 2) & 1U;
-        const packed::Pair alternating = k / 2 % 2;
-        range_fft({frame.chirp[k].data(),
-                   {levels.sum[k], levels.sum[k + 1]},
-                   exponent,
-                   {dither, dither ^ alternating}},
-                  weights, &spectrum.row[0][k]);
-        spectrum.chirp_exponent[k / 2] = static_cast<std::int16_t>(exponent + kRangeFftExponent);
+    constexpr std::size_t kAtOnce = 2 * kChirpPairs;
+    for (std::size_t first = 0; first < kChirps; first += kAtOnce) {
+        std::array<ChirpPair, kChirpPairs> pairs;
+        for (std::size_t k = first; k < first + kAtOnce; k += 2) {
+            const int exponent = levels.exponent[k / 2] + guard;
+            const packed::Pair dither = kDither >> (k / 2) & 1U;
+            const packed::Pair alternating = k / 2 % 2;
+            pairs[(k - first) / 2] = {frame.chirp[k].data(),
+                                      {levels.sum[k], levels.sum[k + 1]},
+                                      exponent,
+                                      {dither, dither ^ alternating}};
+            spectrum.chirp_exponent[k / 2] = static_cast<std::int16_t>(exponent + kRangeFftExponent);
+        }
+        range_fft_pairs(pairs, weights, &spectrum.row[0][first]);
     }
 }
 
@@ -143,15 +147,19 @@ int ChirpTaper::apply(std::array<Complex16, kChirps>& row) const {
     return highest_ + down;
 }
 
-void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int range_cell) {
-    auto& row = spectrum.row[static_cast<std::size_t>(range_cell)];
-    const int exponent = taper.apply(row);
-    fft64(row);
+void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int first_range_cell) {
+    const auto first = static_cast<std::size_t>(first_range_cell);
+    for (std::size_t r = first; r < first + kFftRows; ++r) {
+        spectrum.row_exponent[r] = static_cast<std::int16_t>(taper.apply(spectrum.row[r]) + kFftExponent);
+    }
+    fft64_rows(std::span<Spectrum64, kFftRows>(&spectrum.row[first], kFftRows));
     // The taper rounds down: half a step in each of 64 chirps, in standstill alone.
     constexpr std::uint16_t kBias = kFftLength / 2 >> kFftExponent;
-    row[0] = std::bit_cast<Complex16>(packed::add(std::bit_cast<Pair>(row[0]), packed::both(kBias)));
-    spectrum.row_exponent[static_cast<std::size_t>(range_cell)] =
-        static_cast<std::int16_t>(exponent + kFftExponent);
+    for (std::size_t r = first; r < first + kFftRows; ++r) {
+        Complex16& standstill = spectrum.row[r][0];
+        standstill =
+            std::bit_cast<Complex16>(packed::add(std::bit_cast<Pair>(standstill), packed::both(kBias)));
+    }
 }
 
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
@@ -170,7 +178,7 @@ void range_doppler(const BeatFrame& frame, const DcLevels& levels, WindowKind ra
     range_transform(frame, levels, window(range_window), spectrum);
     const ChirpTaper taper(window(doppler_window), spectrum.chirp_exponent);
     for (std::size_t r = 0; r < kRangeCells; ++r) {
-        doppler_transform(spectrum, taper, static_cast<int>(r));
+        if (r % kFftRows == 0) doppler_transform(spectrum, taper, static_cast<int>(r));
         log_power(spectrum.row[r], spectrum.row_exponent[r], map.cell[r]);
     }
 }

@@ -61,9 +61,9 @@ class ChirpTaper {
     bool even_;  ///< all exponents equal
 };
 
-/// Window and transform over the chirps of one range cell, in place. Each row has its own exponent, from its
-/// own largest sample.
-void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int range_cell);
+/// Window and transform over the chirps of kFftRows range cells (one, on a board), in place. Each row has its
+/// own exponent, from its own largest sample.
+void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int first_range_cell);
 
 /// One row of the map from one row of the spectrum. By log2_coarse_q10.
 void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,

@@ -1,5 +1,6 @@
 #include "dsp/range_fft.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 
@@ -46,47 +47,69 @@ alignas(8) constexpr auto kSharedColumns = [] {
     return columns;
 }();
 
+// Word: a Pair for two chirps, or on a PC a Quad for four times two, each chirp two columns from the last
+// one.
+
 /// Between the passes: for each chirp rows of 8, first cells 0, 8 .., then 1, 9 .., 2, 10 .. and 3, 11 ..
-using Rows = std::array<Pair, kFftLength>;
+template <class Word>
+using Rows = std::array<Word, kFftLength>;
+
+inline Pair sample(const std::int16_t* x, Pair) {
+    return static_cast<Pair>(std::int32_t{*x});
+}
+inline void put(Complex16* to, Pair x) {
+    store(*to, x);
+}
+#if DSP_PACKED_FOUR
+constexpr std::ptrdiff_t kFour = std::ptrdiff_t{2} * kSamples;  ///< from one pair of chirps to the next
+inline Quad sample(const std::int16_t* x, Quad) {
+    return Quad(_mm_set_epi32(x[3 * kFour], x[2 * kFour], x[kFour], x[0]));
+}
+inline void put(Complex16* to, Quad x) {
+    std::array<Complex16, 4> four;
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(four.data()), x.v);
+    for (std::size_t i = 0; i < 4; ++i) to[2 * i] = four[i];
+}
+#endif
 
 /// Of one chirp. A word is sample n + 32 times 2^16 plus sample n, as a sum: where the latter is negative, it
 /// takes one from the upper lane, half a step on average, which dither in dc turns. Row 0 gets the sums of
 /// samples with even and with odd m.
-void first_pass(const std::int16_t* x, Pair gain, Pair dc, const RangeWindow& window, Pair* to) {
+template <class Word>
+inline void first_pass(const std::int16_t* x, Pair gain, Word dc, const RangeWindow& window, Word* to) {
     using namespace packed;
     const Pair* table = window.columns()->weight.data();
     const auto load_two = [&](std::size_t m) {
-        const auto sample = [&x](std::size_t n) { return static_cast<Pair>(std::int32_t{x[n]}); };
-        return multiply_add(add_shifted(sample(8 * m), sample(8 * m + 32)), gain, dc);
+        return multiply_add(add_shifted(sample(x + 8 * m, dc), sample(x + 8 * m + 32, dc)), gain, dc);
     };
     const std::int16_t* const end = x + 8;
     do {
         Pair w0 = 0;
         Pair w2 = 0;
         take_pair(table, w0, w2);
-        const Pair x0 = load_two(0);
-        const Pair x2 = load_two(2);
-        const Pair a = pack_high(dot_minus(x0, w0, kHalf), dot_minus(x2, w2, kHalf));
-        const std::int32_t sum0 = dot(x0, w0, kHalf);
-        const std::int32_t sum2 = dot(x2, w2, kHalf);
+        const Word x0 = load_two(0);
+        const Word x2 = load_two(2);
+        const Word a = pack_high(dot_minus(x0, w0, kHalf), dot_minus(x2, w2, kHalf));
+        const auto sum0 = dot(x0, w0, kHalf);
+        const auto sum2 = dot(x2, w2, kHalf);
         Pair w1 = 0;
         Pair turned1 = 0;
         take_pair(table, w1, turned1);
-        const Pair x1 = load_two(1);
-        const Pair sum01 = pack_high(sum0, dot(x1, w1, kHalf));
-        const std::int32_t difference1 = dot_minus(x1, turned1, kHalf);
+        const Word x1 = load_two(1);
+        const Word sum01 = pack_high(sum0, dot(x1, w1, kHalf));
+        const auto difference1 = dot_minus(x1, turned1, kHalf);
         Pair w3 = 0;
         Pair turned3 = 0;
         take_pair(table, w3, turned3);
-        const Pair x3 = load_two(3);
+        const Word x3 = load_two(3);
         ++x;
-        const Pair b = pack_high(difference1, dot_minus(x3, turned3, kHalf));
-        const Pair sum23 = pack_high(sum2, dot(x3, w3, kHalf));
+        const Word b = pack_high(difference1, dot_minus(x3, turned3, kHalf));
+        const Word sum23 = pack_high(sum2, dot(x3, w3, kHalf));
         to[0] = add(sum01, sum23);
-        const Pair conjugate2 = sub(sum01, sum23);
-        const Pair turned = add_j(b, b);  // (b1 - b3, b1 + b3), in units of cos 45 degrees
-        const Pair conjugate1 = add(a, turned);
-        const Pair y3 = sub(a, turned);
+        const Word conjugate2 = sub(sum01, sum23);
+        const Word turned = add_j(b, b);  // (b1 - b3, b1 + b3), in units of cos 45 degrees
+        const Word conjugate1 = add(a, turned);
+        const Word y3 = sub(a, turned);
         Pair root1 = 0;
         Pair root3 = 0;
         take_pair(table, root1, root3);
@@ -94,7 +117,7 @@ void first_pass(const std::int16_t* x, Pair gain, Pair dc, const RangeWindow& wi
         Pair rounding = 0;
         take_pair(table, root2, rounding);
         const auto half = static_cast<std::int32_t>(rounding);
-        const auto rotate_conjugate = [half](Pair y, Pair root) {
+        const auto rotate_conjugate = [half](Word y, Pair root) {
             return pack_high(dot(y, root, half), dot_cross_minus(y, root, half));
         };
         to[8] = rotate_conjugate(conjugate1, root1);
@@ -105,11 +128,12 @@ void first_pass(const std::int16_t* x, Pair gain, Pair dc, const RangeWindow& wi
 }
 
 /// Cells 0, 8 .. of both chirps to row 0, as the parts of complex numbers, and cells 4, 12 .. to row 4.
-void share(Rows& rows) {
+template <class Word>
+inline void share(Rows<Word>& rows) {
     using namespace packed;
     constexpr Pair kOne = pack(32767, 32767);
     const Pair* table = &kSharedColumns[0].rounding;
-    for (Pair* to = rows.data(); to != rows.data() + 8; ++to) {
+    for (Word* to = rows.data(); to != rows.data() + 8; ++to) {
         Pair first = 0;
         Pair c = 0;
         take_pair(table, first, c);
@@ -117,34 +141,35 @@ void share(Rows& rows) {
         Pair minus_s = 0;
         take_pair(table, s, minus_s);
         const auto rounding = static_cast<std::int32_t>(first);
-        const Pair even = to[0];
-        const Pair odd = to[32];
+        const Word even = to[0];
+        const Word odd = to[32];
         to[0] = pack_high(dot(even, kOne, rounding), dot(odd, kOne, rounding));
         to[32] = pack_high(dot_minus(odd, s, dot_minus(even, c, rounding)),
                            dot_minus(odd, c, dot_minus(even, minus_s, rounding)));
     }
 }
 
-inline Complex16 conjugate(Pair z) {
-    return std::bit_cast<Complex16>(packed::pack_mixed(z, packed::saturated_sub(0, z)));
+template <class Word>
+inline Word conjugate(Word z) {
+    return packed::pack_mixed(z, packed::saturated_sub(Word{}, z));
 }
 
 /// Cells kFirst + 8 q of both chirps, whose transforms are the parts of one.
-template <std::size_t kFirst>
-void shared_cells(const Pair* row, Complex16* out) {
-    std::array<Pair, 8> z;
+template <std::size_t kFirst, class Word>
+inline void shared_cells(const Word* row, Complex16* out) {
+    std::array<Word, 8> z;
     const auto x = packed::load_8(row);
     transform<Halving::second_and_third>([&x](std::size_t n) { return x[n]; },
-                                         [&z](std::size_t q, Pair low, Pair high) {
+                                         [&z](std::size_t q, Word low, Word high) {
                                              z[q] = low;
                                              z[q + 4] = high;
                                          });
     const auto split = [&](std::size_t q) {
-        const Pair p = z[q];
-        const Pair mirrored = packed::swap(z[kFirst == 0 ? (8 - q) % 8 : 7 - q]);
+        const Word p = z[q];
+        const Word mirrored = packed::swap(z[kFirst == 0 ? (8 - q) % 8 : 7 - q]);
         Complex16* const to = &out[kFftLength * (kFirst + 8 * q)];
-        to[0] = std::bit_cast<Complex16>(packed::saturated_sub_j(p, mirrored));
-        to[1] = std::bit_cast<Complex16>(packed::saturated_sub_j(mirrored, p));
+        put(to, packed::saturated_sub_j(p, mirrored));
+        put(to + 1, packed::saturated_sub_j(mirrored, p));
     };
     split(0);
     split(1);
@@ -152,19 +177,20 @@ void shared_cells(const Pair* row, Complex16* out) {
     split(3);
 }
 
-void second_pass(const Rows& rows, Complex16* out) {
+template <class Word>
+inline void second_pass(const Rows<Word>& rows, Complex16* out) {
     shared_cells<0>(rows.data(), out);
     shared_cells<4>(&rows[32], out);
-    const Pair* row = rows.data();
+    const Word* row = rows.data();
     for (std::size_t chirp = 0; chirp < 2; ++chirp) {
         for (std::size_t k = 1; k < 4; ++k) {
             row += 8;
             const auto x = packed::load_8(row);
             transform<Halving::second>([&x](std::size_t n) { return x[n]; },
                                        [low_to = out + kFftLength * k, high_to = out + kFftLength * (32 - k)](
-                                           std::size_t q, Pair low, Pair high) {
-                                           low_to[kFftLength * 8 * q] = std::bit_cast<Complex16>(low);
-                                           *(high_to - kFftLength * 8 * q) = conjugate(high);
+                                           std::size_t q, Word low, Word high) {
+                                           put(low_to + kFftLength * 8 * q, low);
+                                           put(high_to - kFftLength * 8 * q, conjugate(high));
                                        });
         }
         row += 8;
@@ -202,25 +228,60 @@ namespace {
 
 }  // namespace
 
+namespace {
+
+/// -2^up times the mean, in both lanes.
+Pair minus_mean(std::int32_t sum, int up) {
+    const std::int32_t mean =
+        up < kMeanBits ? (sum + (kSamples >> up >> 1)) >> (kMeanBits - up) : sum * (1 << (up - kMeanBits));
+    return Pair{0} - static_cast<Pair>(mean) * 0x10001U;
+}
+
+}  // namespace
+
 void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* out) {
-    Rows rows;
+    Rows<Pair> rows;
     const int up = kHighestExponent - chirps.exponent;
     const auto chirp = [&](std::size_t i, Pair* to) {
         const std::int16_t* const x = chirps.samples + kSamples * i;
-        const std::int32_t sum = chirps.sum[i];
         const Pair dither = chirps.dither[i] << 16;
         if (up < 0) {
-            first_pass_scaled_down(x, sum, -up, dither, window, to);
+            first_pass_scaled_down(x, chirps.sum[i], -up, dither, window, to);
         } else {
-            const std::int32_t mean = up < kMeanBits ? (sum + (kSamples >> up >> 1)) >> (kMeanBits - up)
-                                                     : sum * (1 << (up - kMeanBits));
-            first_pass(x, Pair{1} << up, dither - static_cast<Pair>(mean) * 0x10001U, window, to);
+            first_pass(x, Pair{1} << up, dither + minus_mean(chirps.sum[i], up), window, to);
         }
     };
     chirp(0, rows.data());
     chirp(1, &rows[kFftLength / 2]);
     share(rows);
     second_pass(rows, out);
+}
+
+void range_fft_pairs(std::span<const ChirpPair, kChirpPairs> pairs, const RangeWindow& window,
+                     Complex16* out) {
+#if DSP_PACKED_FOUR
+    const int exponent = pairs[0].exponent;
+    const int up = kHighestExponent - exponent;
+    if (up >= 0 && std::ranges::all_of(pairs, [&](const ChirpPair& p) { return p.exponent == exponent; })) {
+        Rows<Quad> rows;
+        const auto chirp = [&](std::size_t i, Quad* to) {
+            const auto dc = [&](std::size_t pair) {
+                return static_cast<int>((pairs[pair].dither[i] << 16) + minus_mean(pairs[pair].sum[i], up));
+            };
+            first_pass(pairs[0].samples + kSamples * i, Pair{1} << up,
+                       Quad(_mm_set_epi32(dc(3), dc(2), dc(1), dc(0))), window, to);
+        };
+        chirp(0, rows.data());
+        chirp(1, &rows[kFftLength / 2]);
+        share(rows);
+        second_pass(rows, out);
+        return;
+    }
+#endif
+    for (const ChirpPair& pair : pairs) {
+        range_fft(pair, window, out);
+        out += 2;
+    }
 }
 
 }  // namespace dsp

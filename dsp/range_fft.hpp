@@ -56,4 +56,10 @@ struct ChirpPair {
 inline constexpr int kRangeFftExponent = 2;
 void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* out);
 
+/// As many pairs at once as the machine's words hold, with the same bits, to columns next to each other: one
+/// on a board, four on a PC. The chirps of all pairs are next to each other in memory.
+inline constexpr std::size_t kChirpPairs = DSP_PACKED_FOUR ? 4 : 1;
+void range_fft_pairs(std::span<const ChirpPair, kChirpPairs> pairs, const RangeWindow& window,
+                     Complex16* out);
+
 }  // namespace dsp

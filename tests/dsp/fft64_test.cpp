@@ -128,3 +128,19 @@ TEST(Fft64, NoiseIsAsStatedAndBiasNone) {
 TEST(Fft64, AccuracyTable) {
     for (const auto& row : bench::fft_accuracy()) CHECK_TEXT(row.met(), row.what.c_str());
 }
+
+TEST(Fft64, RowsAtOnceAreTheSameBits) {
+    std::array<dsp::Spectrum64, dsp::kFftRows> rows;
+    for (int trial = 0; trial < 200; ++trial) {
+        for (auto& row : rows) {
+            for (std::size_t n = 0; n < 64; ++n) {
+                set(n, draw(), draw());
+                row[n] = data[n];
+            }
+        }
+        std::array<dsp::Spectrum64, dsp::kFftRows> expected = rows;
+        for (auto& row : expected) dsp::fft64(row);
+        dsp::fft64_rows(rows);
+        CHECK(rows == expected);
+    }
+}

@@ -189,3 +189,28 @@ TEST(RangeFft, OneCodeIsLifted) {
     CHECK(out[64 + 1].re < -300);
     CHECK(out[64] == dsp::Complex16{});
 }
+
+TEST(RangeFft, PairsAtOnceAreTheSameBits) {
+    constexpr std::size_t kPairs = dsp::kChirpPairs;
+    std::array<std::int16_t, 128 * kPairs> chirps;
+    const dsp::RangeWindow weights(window);
+    for (int trial = 0; trial < 300; ++trial) {
+        const int exponent = trial % 6 - 2;
+        for (std::int16_t& x : chirps) {
+            x = static_cast<std::int16_t>(
+                std::ldexp(static_cast<double>(random() % 8192) - 4096, std::min(exponent, 1)));
+        }
+        std::array<dsp::ChirpPair, kPairs> pairs;
+        for (std::size_t i = 0; i < kPairs; ++i) {
+            pairs[i] = {&chirps[128 * i], {0, 0}, exponent, {static_cast<unsigned>(i % 2), 1}};
+            for (std::size_t n = 0; n < 128; ++n) pairs[i].sum[n / 64] += chirps[128 * i + n];
+        }
+        if (trial % 7 == 0) ++pairs.back().exponent;  // four at once need one exponent
+        std::array<dsp::Complex16, 32 * 64> expected;
+        expected.fill({kUntouched, kUntouched});
+        out = expected;
+        for (std::size_t i = 0; i < kPairs; ++i) dsp::range_fft(pairs[i], weights, &expected[2 * i]);
+        dsp::range_fft_pairs(pairs, weights, out.data());
+        CHECK(out == expected);
+    }
+}

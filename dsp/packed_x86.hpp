@@ -1,0 +1,172 @@
+/// Four words of packed.hpp at once, for PCs: the same operations under the same names, each on four Pairs in
+/// a register of SSE2, which every x86-64 has. What the boards compute word by word, a PC computes four words
+/// wide, with the same bits.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "dsp/packed.hpp"
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#define DSP_PACKED_FOUR 1
+#else
+#define DSP_PACKED_FOUR 0
+#endif
+
+#if DSP_PACKED_FOUR
+namespace dsp::packed {
+
+/// Four sums of 32 bits.
+struct Sum4 {
+    __m128i v;
+    explicit Sum4(__m128i x) : v(x) {}
+    /// The same in all four.
+    Sum4(std::int32_t x)
+        : v(_mm_set1_epi32(x)) {}  // NOLINT(google-explicit-constructor): constants mix with sums
+};
+
+/// Four Pairs.
+struct Quad {
+    __m128i v = _mm_setzero_si128();
+    Quad() = default;
+    explicit Quad(__m128i x) : v(x) {}
+    /// The same in all four.
+    Quad(Pair x) : v(_mm_set1_epi32(static_cast<int>(x))) {}  // NOLINT(google-explicit-constructor): as above
+};
+
+/// Words i .. i + 3 of four rows, `stride` words from one to the next, to Quads i .. i + 3.
+template <class T>
+void load_transposed(const T* rows, std::size_t stride, Quad* columns) {
+    static_assert(sizeof(T) == 4);
+    const auto row = [&](std::size_t i) {
+        return _mm_castsi128_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(rows + i * stride)));
+    };
+    __m128 a = row(0);
+    __m128 b = row(1);
+    __m128 c = row(2);
+    __m128 d = row(3);
+    _MM_TRANSPOSE4_PS(a, b, c, d);
+    columns[0] = Quad(_mm_castps_si128(a));
+    columns[1] = Quad(_mm_castps_si128(b));
+    columns[2] = Quad(_mm_castps_si128(c));
+    columns[3] = Quad(_mm_castps_si128(d));
+}
+/// The same back.
+template <class T>
+void store_transposed(const Quad* columns, T* rows, std::size_t stride) {
+    static_assert(sizeof(T) == 4);
+    __m128 a = _mm_castsi128_ps(columns[0].v);
+    __m128 b = _mm_castsi128_ps(columns[1].v);
+    __m128 c = _mm_castsi128_ps(columns[2].v);
+    __m128 d = _mm_castsi128_ps(columns[3].v);
+    _MM_TRANSPOSE4_PS(a, b, c, d);
+    const auto store = [&](std::size_t i, __m128 row) {
+        _mm_storeu_si128(reinterpret_cast<__m128i*>(rows + i * stride), _mm_castps_si128(row));
+    };
+    store(0, a);
+    store(1, b);
+    store(2, c);
+    store(3, d);
+}
+
+namespace detail {
+inline __m128i upper_lanes() {
+    return _mm_set1_epi32(static_cast<int>(0xFFFF0000U));
+}
+/// Lane 0 of one, lane 1 of the other.
+inline Quad mix(Quad low_from, Quad high_from) {
+    return Quad(
+        _mm_or_si128(_mm_andnot_si128(upper_lanes(), low_from.v), _mm_and_si128(upper_lanes(), high_from.v)));
+}
+/// (a0, -a1), wrapping.
+inline Quad conjugate(Quad a) {
+    return Quad(_mm_sub_epi16(_mm_xor_si128(a.v, upper_lanes()), upper_lanes()));
+}
+}  // namespace detail
+
+inline Quad swap(Quad a) {
+    constexpr int kExchange = 0b10'11'00'01;
+    return Quad(_mm_shufflehi_epi16(_mm_shufflelo_epi16(a.v, kExchange), kExchange));
+}
+
+namespace portable {  // beside the functions they overload
+
+inline Quad add(Quad a, Quad b) {
+    return Quad(_mm_add_epi16(a.v, b.v));
+}
+inline Quad sub(Quad a, Quad b) {
+    return Quad(_mm_sub_epi16(a.v, b.v));
+}
+inline Quad saturated_add(Quad a, Quad b) {
+    return Quad(_mm_adds_epi16(a.v, b.v));
+}
+inline Quad saturated_sub(Quad a, Quad b) {
+    return Quad(_mm_subs_epi16(a.v, b.v));
+}
+/// a + b = 2 (a and b) + (a xor b)
+inline Quad half_add(Quad a, Quad b) {
+    return Quad(_mm_add_epi16(_mm_and_si128(a.v, b.v), _mm_srai_epi16(_mm_xor_si128(a.v, b.v), 1)));
+}
+/// a - b = (a xor b) - 2 (b and not a)
+inline Quad half_sub(Quad a, Quad b) {
+    return Quad(_mm_sub_epi16(_mm_srai_epi16(_mm_xor_si128(a.v, b.v), 1), _mm_andnot_si128(a.v, b.v)));
+}
+inline Quad add_j(Quad a, Quad b) {
+    return detail::mix(sub(a, swap(b)), add(a, swap(b)));
+}
+inline Quad sub_j(Quad a, Quad b) {
+    return detail::mix(add(a, swap(b)), sub(a, swap(b)));
+}
+inline Quad half_add_j(Quad a, Quad b) {
+    return detail::mix(half_sub(a, swap(b)), half_add(a, swap(b)));
+}
+inline Quad half_sub_j(Quad a, Quad b) {
+    return detail::mix(half_add(a, swap(b)), half_sub(a, swap(b)));
+}
+inline Quad saturated_add_j(Quad a, Quad b) {
+    return detail::mix(saturated_sub(a, swap(b)), saturated_add(a, swap(b)));
+}
+inline Quad saturated_sub_j(Quad a, Quad b) {
+    return detail::mix(saturated_add(a, swap(b)), saturated_sub(a, swap(b)));
+}
+inline Quad pack_high(Sum4 lane_0, Sum4 lane_1) {
+    return Quad(_mm_or_si128(_mm_srli_epi32(lane_0.v, 16), _mm_and_si128(lane_1.v, detail::upper_lanes())));
+}
+inline Quad pack_doubled(Sum4 lane_0, Sum4 lane_1) {
+    return pack_high(Sum4(_mm_slli_epi32(lane_0.v, 1)), Sum4(_mm_slli_epi32(lane_1.v, 1)));
+}
+inline Quad pack_mixed(Quad low_from, Quad high_from) {
+    return detail::mix(low_from, high_from);
+}
+inline Sum4 dot(Quad a, Quad b, Sum4 sum) {
+    return Sum4(_mm_add_epi32(_mm_madd_epi16(a.v, b.v), sum.v));
+}
+/// a + 2^16 b and a 2^up + sum, in 32 bits
+inline Quad add_shifted(Quad a, Quad b) {
+    return Quad(_mm_add_epi32(a.v, _mm_slli_epi32(b.v, 16)));
+}
+inline Quad multiply_add(Quad a, Pair power_of_two, Quad sum) {
+    return Quad(_mm_add_epi32(_mm_sll_epi32(a.v, _mm_cvtsi32_si128(std::countr_zero(power_of_two))), sum.v));
+}
+/// The differences: lane 1 of b, or lane 0 of it, is not -2^15.
+inline Sum4 dot_minus(Quad a, Quad b, Sum4 sum) {
+    return dot(a, detail::conjugate(b), sum);
+}
+inline Sum4 dot_cross(Quad a, Quad b, Sum4 sum) {
+    return dot(a, swap(b), sum);
+}
+inline Sum4 dot_cross_minus(Quad a, Quad b, Sum4 sum) {
+    return dot(a, detail::conjugate(swap(b)), sum);
+}
+inline std::array<Quad, 8> load_8(const Quad* from) {
+    return {from[0], from[1], from[2], from[3], from[4], from[5], from[6], from[7]};
+}
+
+}  // namespace portable
+
+}  // namespace dsp::packed
+#endif
