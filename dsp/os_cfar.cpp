@@ -444,7 +444,8 @@ std::uint64_t in_order(const RowBits& bits) {
     return low | std::uint64_t{high} << 32;
 }
 
-constexpr int kUnrolled = 8;
+constexpr int kUnrolled = 8;  ///< reference cells on a side along Doppler, and along range
+constexpr int kUnrolledRange = 2;
 
 /// What the cells under test of a row have in common.
 struct RowTest {
@@ -479,7 +480,11 @@ struct RowTest {
             count(packed::load(left + i - 1 - k));
         }
         const std::size_t d = column + 2 * static_cast<std::size_t>(i);
-        for (auto cell = test.range_reference.data(); cell != test.range_end; cell += 2) {
+        unrolled<2 * kUnrolledRange, 2, kUnrolledRange>([&](std::size_t k) {
+            count(packed::pack_low(test.range_reference[k][d], test.range_reference[k + 1][d]));
+        });
+        for (auto cell = test.range_reference.data() + 2 * kUnrolledRange; cell != test.range_end;
+             cell += 2) {
             count(packed::pack_low(cell[0][d], cell[1][d]));
         }
         if ((not_below & 0xFFFFU) + (not_below >> 16) <= test.most) hits |= std::uint32_t{0x8000'0000} >> i;
@@ -489,7 +494,8 @@ struct RowTest {
 
 /// Those of several `candidates` in a row that are over threshold, as CellMask::row: the reference cells of
 /// one, laid side by side, are compared two at once. For a spacing of 2, kUnrolled or a larger even number of
-/// reference cells on each side along Doppler, and a threshold of 0..65535.
+/// reference cells on each side along Doppler, kUnrolledRange or more along range, and a threshold of
+/// 0..65535.
 [[gnu::noinline]] std::uint64_t several_over_threshold(const PowerMap& map, const OsCfar& cfar, int r,
                                                        const RowBits& candidates) {
     const CfarConfig& config = cfar.config();
@@ -524,8 +530,8 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
     const bool enough = (config.doppler_reference - 1) * config.spacing >= 14 && least <= 16;
     const auto more = static_cast<std::uint32_t>(std::max(least - 9, 0));
     const bool regular = config.spacing == 2 && config.doppler_reference >= kUnrolled &&
-                         config.doppler_reference % 2 == 0 && cfar.threshold() >= 0 &&
-                         cfar.threshold() <= 0xFFFF;
+                         config.doppler_reference % 2 == 0 && config.range_reference >= kUnrolledRange &&
+                         cfar.threshold() >= 0 && cfar.threshold() <= 0xFFFF;
     for (int r = config.first_range_cell; r < kRangeCells; ++r) {
         const MapRow& row = map.cell[static_cast<std::size_t>(r)];
         RowBits candidates{~std::uint32_t{0}, ~std::uint32_t{0}};
