@@ -556,7 +556,8 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
                 }
             }
         }
-        if (regular && !few<1>(candidates[0] | candidates[1])) {
+        // To lay a row out costs as much as to test two cells without.
+        if (regular && !few<2>(candidates[0] | candidates[1])) {
             peaks.row[static_cast<std::size_t>(r)] = several_over_threshold(map, cfar, r, candidates);
             continue;
         }
