@@ -66,7 +66,8 @@ void sort(std::span<Candidate> list) {
 }
 
 /// Fills `list` with the strongest candidates in descending order. Returns how many; counts the rest.
-[[gnu::noinline]] int collect(const PowerMap& map, const CellMask& peaks, CandidateList& list, int& rest) {
+[[gnu::noinline]] std::size_t collect(const PowerMap& map, const CellMask& peaks, CandidateList& list,
+                                      int& rest) {
     std::size_t count = 0;
     for (int r = 0; r < kRangeCells; ++r) {
         for (std::uint64_t bits = peaks.row[static_cast<std::size_t>(r)]; bits != 0; bits &= bits - 1) {
@@ -85,7 +86,7 @@ void sort(std::span<Candidate> list) {
         }
     }
     sort({list.data(), count});
-    return static_cast<int>(count);
+    return count;
 }
 
 /// Five neighbouring cells along an axis, and a zero.
@@ -275,50 +276,75 @@ class Guess {
     std::int32_t index_;
 };
 
-/// Which maxima are no targets beside others.
+/// Which maxima are no targets but sidelobes of others. Remembers the targets by range cell: away from a
+/// target's rows its sidelobes are so weak that most pairs need no look.
 class Sidelobes {
   public:
-    Sidelobes(const WindowResponse& range, const WindowResponse& doppler, const PeakConfig& config)
+    Sidelobes(const WindowResponse& range, const WindowResponse& doppler, const PeakConfig& config,
+              const CandidateList& list)
         : range_(range),
           doppler_(doppler),
+          list_(list),
           margin_(log2_from_cdb(config.sidelobe_margin_cdb)),
-          dynamic_range_(log2_from_cdb(config.dynamic_range_cdb)),
-          strongest_(std::max(range.sidelobe[2], doppler.sidelobe[2])) {}
+          dynamic_range_(log2_from_cdb(config.dynamic_range_cdb)) {}
 
-    /// Whether sidelobes of `targets`, the strongest first, explain `peak`, no neighbour of theirs. Targets
-    /// reach any distance; what is far below the strongest one is never believed.
-    [[nodiscard, gnu::noinline]] bool explain(const Cell& peak, std::span<const Candidate> targets) const {
-        if (targets.empty()) return false;
-        if (peak.power < unpack(targets[0]).power - dynamic_range_) return true;
+    /// Whether sidelobes of the targets explain `peak`, no neighbour of theirs and not stronger than any peak
+    /// before. What is far below the strongest target is never believed.
+    [[nodiscard, gnu::noinline]] bool explain(const Cell& peak) {
+        if (occupied_ == 0) return false;
+        if (peak.power < strongest_ - dynamic_range_) return true;
         const std::int32_t over_margin = peak.power - margin_;
-        // A sidelobe is at most strongest_ (the mirrored spectrum begins at cell 2).
-        const std::int32_t weakest_target = peak.range >= 2 ? over_margin - strongest_ : -1;
         const std::int16_t* range_response = range_.sidelobe.data();
         const std::int16_t* doppler_response = doppler_.sidelobe.data();
         const auto distance = [](int cells) { return static_cast<std::size_t>(cells) & (kWindowLength - 1); };
-        for (const Candidate candidate : targets) {
-            const Cell target = unpack(candidate);
-            if (target.power <= weakest_target) return false;  // as are the rest
-            const std::int32_t excess = over_margin - target.power;
-            const std::int32_t range = range_response[distance(target.range - peak.range)];
-            // A real signal's other half: the spectrum at -range, -Doppler.
-            const std::int32_t range_mirrored = range_response[target.range + peak.range];
-            // What is too weak at the same Doppler shift is weaker at any other: nearly all pairs end here.
-            if (excess >= range && excess >= range_mirrored) continue;
-            if (excess < range + doppler_response[distance(target.doppler - peak.doppler)] ||
-                excess < range_mirrored + doppler_response[distance(target.doppler + peak.doppler)]) {
-                return true;
+        // Beyond reach_ the response is less than this peak over the strongest target. (Where it rises again,
+        // by one step: see WindowResponse::sidelobe.) The spectrum at -range, a real signal's other half, is
+        // no nearer.
+        while (reach_ < kRangeCells &&
+               std::max(range_response[reach_ + 1], range_response[reach_ + 2]) > over_margin - strongest_) {
+            ++reach_;
+        }
+        constexpr std::uint32_t kAll = ~std::uint32_t{0};
+        std::uint32_t rows = occupied_ & kAll << std::max(peak.range - reach_, 0) &
+                             kAll >> std::max(kRangeCells - 1 - peak.range - reach_, 0);
+        for (; rows != 0; rows &= rows - 1) {
+            const int row = std::countr_zero(rows);
+            const std::int32_t range = range_response[distance(row - peak.range)];
+            const std::int32_t range_mirrored = range_response[row + peak.range];
+            for (std::size_t i = last_[static_cast<std::size_t>(row)]; i != 0; i = previous_[i - 1]) {
+                const Cell target = unpack(list_[i - 1]);
+                const std::int32_t excess = over_margin - target.power;
+                if (excess >= range && excess >= range_mirrored) continue;
+                if (excess < range + doppler_response[distance(target.doppler - peak.doppler)] ||
+                    excess < range_mirrored + doppler_response[distance(target.doppler + peak.doppler)]) {
+                    return true;
+                }
             }
         }
         return false;
     }
+    /// list[index] is a target.
+    void add(std::size_t index) {
+        const Cell target = unpack(list_[index]);
+        if (occupied_ == 0) strongest_ = target.power;
+        occupied_ |= std::uint32_t{1} << target.range;
+        std::uint8_t& last = last_[static_cast<std::size_t>(target.range)];
+        previous_[index] = last;
+        last = static_cast<std::uint8_t>(index + 1);
+    }
 
   private:
+    static_assert(kMaxCandidates < 256 && kRangeCells == 32);
     const WindowResponse& range_;
     const WindowResponse& doppler_;
+    const CandidateList& list_;
     std::int32_t margin_;  ///< log2 of power, Q6.10, as the others
     std::int32_t dynamic_range_;
-    std::int32_t strongest_;
+    std::int32_t strongest_ = 0;
+    std::uint32_t occupied_ = 0;                         ///< rows with targets, bit r
+    int reach_ = 1;                                      ///< cells
+    std::array<std::uint8_t, kRangeCells> last_{};       ///< target of each row, as index + 1 of the list
+    std::array<std::uint8_t, kMaxCandidates> previous_;  ///< the one before in its row, 0: none
 };
 
 /// Place and quality of a peak between the cells.
@@ -404,7 +430,6 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
     const WindowResponse& range_response = window_response(range_window);
     const WindowResponse& doppler_response = window_response(doppler_window);
     const std::int32_t min_snr = log2_from_cdb(config.min_snr_cdb);
-    const Sidelobes sidelobes(range_response, doppler_response, config);
     const Real model_error = Real::ratio(config.model_error_mcell, 1000);
     const Real model_variance = model_error * model_error;
     const Real range_cell2 = scale.range_cell_m * scale.range_cell_m;
@@ -413,12 +438,12 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
     detections.count = 0;
     detections.dropped = 0;
     CandidateList list;
-    const int candidates = collect(map, peaks, list, detections.dropped);
-    int targets = 0;  // the candidates that are no sidelobes move to the front of the list
-    for (int c = 0; c < candidates; ++c) {
-        const Cell peak = unpack(list[static_cast<std::size_t>(c)]);
-        if (sidelobes.explain(peak, {list.data(), static_cast<std::size_t>(targets)})) continue;
-        list[static_cast<std::size_t>(targets++)] = pack(peak);
+    const std::size_t candidates = collect(map, peaks, list, detections.dropped);
+    Sidelobes sidelobes(range_response, doppler_response, config, list);
+    for (std::size_t c = 0; c < candidates; ++c) {
+        const Cell peak = unpack(list[c]);
+        if (sidelobes.explain(peak)) continue;
+        sidelobes.add(c);
 
         const std::int32_t snr = peak.power - cfar.noise(map, peak.range, peak.doppler);
         if (snr < min_snr) continue;

@@ -228,8 +228,8 @@ class Neighbours {
     std::int32_t least_;  ///< over those in the upper row
 };
 
-/// A row of the map, even and odd cells apart and repeated to both sides: cell d for -32 <= d < 96 at index
-/// d/2 + 16, so that cells d and d + 2 are a pair.
+/// A row of the map, even and odd cells apart and repeated to both sides, -32 <= d < 96: every second cell is
+/// the next in memory.
 class ParityRow {
   public:
     explicit ParityRow(const MapRow& row) {
@@ -246,11 +246,12 @@ class ParityRow {
             packed::store(&side_[1][again], odds);
         };
         constexpr std::size_t kQuarter = kHalf / 2;
-        for (std::size_t i = 0; i < kQuarter; i += 2) split(i, kQuarter + i, 3 * kQuarter + i);
-        for (std::size_t i = kQuarter; i < kHalf; i += 2) split(i, kQuarter + i, i - kQuarter);
+        unrolled<kQuarter, 2, 4>([&](std::size_t i) {
+            split(i, kQuarter + i, 3 * kQuarter + i);
+            split(kQuarter + i, 2 * kQuarter + i, i);
+        });
     }
-    /// Cells d and d + 2.
-    [[nodiscard]] const std::uint16_t* pair(int d) const {
+    [[nodiscard]] const std::uint16_t* cell(int d) const {
         return side_[static_cast<std::size_t>(d & 1)].data() + (kHalf / 2 + (d >> 1));
     }
 
@@ -428,59 +429,92 @@ bool few(std::uint32_t bits) {
     return bits == 0;
 }
 
-/// Those of `candidates`, no two of them neighbours, that are over threshold, as CellMask::row: two at once,
-/// those at d and d + 2, with their reference cells two in a word. For a spacing of 2, kUnrolled or more
-/// reference cells on each side along Doppler, and a threshold of 0..65535.
-constexpr int kUnrolled = 8;
-[[gnu::noinline]] std::uint64_t detected_in_pairs(const PowerMap& map, const OsCfar& cfar, int r,
-                                                  const RowBits& candidates) {
-    const CfarConfig& config = cfar.config();
-    const MapRow& row = map.cell[static_cast<std::size_t>(r)];
-    const ParityRow parity(row);
-    std::array<const std::uint16_t*, std::size_t{2} * kMaxRangeReference> range_reference;
-    const std::uint16_t** range_end = range_reference.data();
-    for_each_range_reference(map, config, r, 0,
-                             [&range_end](const std::uint16_t* cell) { *range_end++ = cell; });
-    const packed::Pair thresholds = packed::both(static_cast<std::uint16_t>(cfar.threshold()));
-    const auto not_below = static_cast<std::uint16_t>(config.reference_cells() - config.rank);
-    const int first = config.doppler_guard + 1;
-    std::uint64_t detected = 0;
-    for (int odd = 0; odd < 2; ++odd) {
-        const std::uint16_t* pairs = parity.pair(odd);
-        const std::uint16_t* rightmost = parity.pair(odd + first);
-        const std::uint16_t* leftmost = parity.pair(odd - first);
-        for (std::uint32_t rest = candidates[static_cast<std::size_t>(odd)]; rest != 0;) {
-            const int i = take_first(rest);
-            const std::uint32_t next = std::uint32_t{0x4000'0000} >> i;
-            const packed::Pair wanted = (rest & next) == 0 ? packed::pack(1, 0) : packed::both(1);
-            rest &= ~next;
-            // Nothing is below a limit of zero.
-            const packed::Pair limits = packed::floored_sub(packed::load(pairs + i), thresholds);
-            packed::Pair above = 0;
-            const auto count = [&above, limits](packed::Pair references) {
-                above += packed::at_least(references, limits);
-            };
-            const std::uint16_t* right = rightmost + i;
-            const std::uint16_t* left = leftmost + i;
-            unrolled<kUnrolled, 1, kUnrolled>([&](std::size_t k) {
-                count(packed::load(right + k));
-                count(packed::load(left - k));
-            });
-            for (int k = kUnrolled; k < config.doppler_reference; ++k) {
-                count(packed::load(right + k));
-                count(packed::load(left - k));
-            }
-            const int d = 2 * i + odd;
-            const int second = (d + 2) & static_cast<int>(kDopplerMask);
-            for (const std::uint16_t** reference = range_reference.data(); reference != range_end;) {
-                const std::uint16_t* cell = *reference++;
-                count(packed::pack_low(cell[d], cell[second]));
-            }
-            const packed::Pair found = packed::where_at_least(packed::both(not_below), above, wanted);
-            detected |= std::uint64_t{(found & 1U) | (found >> 16 << 2)} << d;
+/// The bits of a row as in CellMask.
+std::uint64_t in_order(const RowBits& bits) {
+    const auto spread = [](std::uint32_t x) {  // bits 15..0 to bits 30, 28, .. 0
+        x = (x | x << 8) & 0x00FF'00FFU;
+        x = (x | x << 4) & 0x0F0F'0F0FU;
+        x = (x | x << 2) & 0x3333'3333U;
+        return (x | x << 1) & 0x5555'5555U;
+    };
+    const std::uint32_t even = packed::reverse_bits(bits[0]);
+    const std::uint32_t odd = packed::reverse_bits(bits[1]);
+    const std::uint32_t low = spread(even & 0xFFFFU) | spread(odd & 0xFFFFU) << 1;
+    const std::uint32_t high = spread(even >> 16) | spread(odd >> 16) << 1;
+    return low | std::uint64_t{high} << 32;
+}
+
+constexpr int kUnrolled = 8;  ///< reference cells on a side along Doppler, and along range
+constexpr int kUnrolledRange = 2;
+
+/// What the cells under test of a row have in common.
+struct RowTest {
+    std::int32_t threshold;
+    std::uint32_t most;     ///< reference cells not below the limit, of a target
+    int doppler_reference;  ///< see several_over_threshold()
+    std::array<const std::uint16_t*, std::size_t{2} * kMaxRangeReference> range_reference;  ///< their rows
+    const std::uint16_t** range_end;
+};
+
+/// Those `candidates` of the even or the odd cells that are over threshold. `cells`: the cells that the bits
+/// stand for; `right`, `left`: the nearest reference cells of the first on either side; `column`: its index.
+[[gnu::noinline]] std::uint32_t over_threshold(std::uint32_t candidates, const std::uint16_t* cells,
+                                               const std::uint16_t* right, const std::uint16_t* left,
+                                               const RowTest& test, std::size_t column) {
+    std::uint32_t hits = 0;
+    while (candidates != 0) {
+        const int i = take_first(candidates);
+        // Nothing is below a limit of zero.
+        const packed::Pair limit =
+            packed::both(static_cast<std::uint16_t>(std::max<std::int32_t>(cells[i] - test.threshold, 0)));
+        packed::Pair not_below = 0;
+        const auto count = [&not_below, limit](packed::Pair references) {
+            not_below += packed::at_least(references, limit);
+        };
+        unrolled<kUnrolled, 2, kUnrolled / 2>([&](std::size_t k) {
+            count(packed::load(right + i + k));
+            count(packed::load(left + i - 1 - k));
+        });
+        for (int k = kUnrolled; k < test.doppler_reference; k += 2) {
+            count(packed::load(right + i + k));
+            count(packed::load(left + i - 1 - k));
         }
+        const std::size_t d = column + 2 * static_cast<std::size_t>(i);
+        unrolled<2 * kUnrolledRange, 2, kUnrolledRange>([&](std::size_t k) {
+            count(packed::pack_low(test.range_reference[k][d], test.range_reference[k + 1][d]));
+        });
+        for (auto cell = test.range_reference.data() + 2 * kUnrolledRange; cell != test.range_end;
+             cell += 2) {
+            count(packed::pack_low(cell[0][d], cell[1][d]));
+        }
+        if ((not_below & 0xFFFFU) + (not_below >> 16) <= test.most) hits |= std::uint32_t{0x8000'0000} >> i;
     }
-    return detected;
+    return hits;
+}
+
+/// Those of several `candidates` in a row that are over threshold, as CellMask::row: the reference cells of
+/// one, laid side by side, are compared two at once. For a spacing of 2, kUnrolled or a larger even number of
+/// reference cells on each side along Doppler, kUnrolledRange or more along range, and a threshold of
+/// 0..65535.
+[[gnu::noinline]] std::uint64_t several_over_threshold(const PowerMap& map, const OsCfar& cfar, int r,
+                                                       const RowBits& candidates) {
+    const CfarConfig& config = cfar.config();
+    RowTest test;
+    test.threshold = cfar.threshold();
+    test.most = static_cast<std::uint32_t>(config.reference_cells() - config.rank);
+    test.doppler_reference = config.doppler_reference;
+    test.range_end = test.range_reference.data();
+    for_each_range_reference(map, config, r, 0,
+                             [&test](const std::uint16_t* cell) { *test.range_end++ = cell; });
+    const ParityRow row(map.cell[static_cast<std::size_t>(r)]);
+    const int first = config.doppler_guard + 1;
+    RowBits hits{};
+    for (std::size_t odd = 0; odd < 2; ++odd) {
+        const int d = static_cast<int>(odd);
+        hits[odd] =
+            over_threshold(candidates[odd], row.cell(d), row.cell(d + first), row.cell(d - first), test, odd);
+    }
+    return in_order(hits);
 }
 
 }  // namespace
@@ -495,8 +529,9 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
     const int least = config.reference_cells() - config.rank + 1;
     const bool enough = (config.doppler_reference - 1) * config.spacing >= 14 && least <= 16;
     const auto more = static_cast<std::uint32_t>(std::max(least - 9, 0));
-    const bool in_pairs = config.spacing == 2 && config.doppler_reference >= kUnrolled &&
-                          cfar.threshold() >= 0 && cfar.threshold() <= 0xFFFF;
+    const bool regular = config.spacing == 2 && config.doppler_reference >= kUnrolled &&
+                         config.doppler_reference % 2 == 0 && config.range_reference >= kUnrolledRange &&
+                         cfar.threshold() >= 0 && cfar.threshold() <= 0xFFFF;
     for (int r = config.first_range_cell; r < kRangeCells; ++r) {
         const MapRow& row = map.cell[static_cast<std::size_t>(r)];
         RowBits candidates{~std::uint32_t{0}, ~std::uint32_t{0}};
@@ -521,8 +556,9 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
                 }
             }
         }
-        if (in_pairs && !few<3>(candidates[0] | candidates[1])) {
-            peaks.row[static_cast<std::size_t>(r)] = detected_in_pairs(map, cfar, r, candidates);
+        // To lay a row out costs as much as to test two cells without.
+        if (regular && !few<2>(candidates[0] | candidates[1])) {
+            peaks.row[static_cast<std::size_t>(r)] = several_over_threshold(map, cfar, r, candidates);
             continue;
         }
         for (std::size_t odd = 0; odd < 2; ++odd) {

@@ -132,6 +132,11 @@ constexpr std::uint32_t bytes_at_least(std::uint32_t a, std::uint32_t b) {
     for (int i = 0; i < 32; i += 8) result |= ((a >> i & 0xFFU) >= (b >> i & 0xFFU) ? 1U : 0U) << i;
     return result;
 }
+constexpr std::uint32_t reverse_bits(std::uint32_t a) {
+    std::uint32_t result = 0;
+    for (int i = 0; i < 32; ++i) result |= (a >> i & 1U) << (31 - i);
+    return result;
+}
 constexpr std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) + product(lane1(a), lane1(b)) + sum);
 }
@@ -322,6 +327,12 @@ inline std::uint32_t high_bytes(Pair a, Pair b) {
 inline std::uint32_t bytes_at_least(std::uint32_t a, std::uint32_t b) {
     (void)__usub8(a, b);
     return __sel(0x01010101U, 0U);
+}
+/// Bit 31 becomes bit 0 and so on.
+inline std::uint32_t reverse_bits(std::uint32_t a) {
+    std::uint32_t result;
+    asm("rbit %0, %1" : "=r"(result) : "r"(a));
+    return result;
 }
 /// sum + a0 b0 + a1 b1
 inline std::int32_t dot(Pair a, Pair b, std::int32_t sum) {

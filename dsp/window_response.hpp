@@ -41,7 +41,8 @@ struct WindowResponse {
     /// peak, by guess -8/16 .. 8/16, Q6.10: places a target where only one neighbour exists.
     std::array<std::int16_t, kGridPerCell + 1> below;
     /// log2 of the largest power m cells away from the peak cell of a target, over that of the peak cell,
-    /// whatever its offset: Q6.10, never positive. The spectrum is cyclic: 63 is 1.
+    /// whatever its offset: Q6.10, never positive. The spectrum is cyclic: 63 is 1. With growing m it falls,
+    /// but may rise once by one place: none from m on is more than the larger of those at m and m + 1.
     std::array<std::int16_t, kWindowLength> sidelobe;
 };
 

@@ -173,6 +173,18 @@ TEST(ExtractPeaks, TheLastRangeCellsAreServedWithALargerVariance) {
     }
 }
 
+TEST(ExtractPeaks, BelowCellZeroTheSpectrumIsTheMirroredOne) {
+    config.cfar.first_range_cell = 0;
+    for (const double r : {1.0, 1.2, 1.4}) {
+        for (const double d : {12.3, -20.6, 30.8}) {
+            add_at(r, d, 45, 20);
+            detect(20);
+            CHECK(list.count >= 1);
+            CHECK(nearest(r, d) < 0.1);
+        }
+    }
+}
+
 TEST(ExtractPeaks, LeakageIsNoTarget) {
     for (auto& s : samples) s = 900;
     for (std::size_t i = 0; i < 4096; ++i) {

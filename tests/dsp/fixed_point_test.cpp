@@ -41,6 +41,17 @@ TEST(FixedPoint, ProductsAreRoundedAsRoundShiftDoes) {
     }
 }
 
+TEST(FixedPoint, SixteenBitsSaturateAfterRoundingDown) {
+    LONGS_EQUAL(32'767, dsp::saturate16(32'767));
+    LONGS_EQUAL(32'767, dsp::saturate16(32'768));
+    LONGS_EQUAL(-32'768, dsp::saturate16(-32'768));
+    LONGS_EQUAL(-32'768, dsp::saturate16(std::numeric_limits<std::int32_t>::min()));
+    LONGS_EQUAL(-1, dsp::saturate16<4>(-1));
+    LONGS_EQUAL(32'767, dsp::saturate16<4>(16 * 32'767 + 15));
+    LONGS_EQUAL(32'767, dsp::saturate16<4>(16 * 32'768));
+    LONGS_EQUAL(-32'768, dsp::saturate16<4>(-16 * 32'768 - 1));
+}
+
 TEST(FixedPoint, RoundDivideMatchesExactComparison) {
     for (int num = -60; num <= 60; ++num) {
         for (int den = 1; den <= 12; ++den) {

@@ -163,6 +163,12 @@ TEST(Packed, FourWordsGoThroughMemory) {
     CHECK((words == std::array<std::uint32_t, 9>{1, 8, 7, 6, 5, 6, 7, 8, 9}));
 }
 
+TEST(Packed, ReversesBits) {
+    for (int i = 0; i < 32; ++i)
+        CHECK(reverse_bits(std::uint32_t{1} << i) == std::uint32_t{0x8000'0000} >> i);
+    CHECK(reverse_bits(0x1234'5678U) == 0x1E6A'2C48U);
+}
+
 TEST(Packed, MagnitudeBitsCoverEveryValue) {
     for (int v = -32768; v <= 32767; ++v) {
         int bits = 1;

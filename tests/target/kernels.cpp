@@ -88,12 +88,17 @@ constexpr std::array<Tone, dsp::kMaxDetections> crowded_targets() {
     return tones;
 }
 
-/// Every second cell of every second row is a maximum, and over threshold by the last of its reference cells.
+/// The most that OS-CFAR can have to do, as far as we know. Every maximum of its row is compared with the
+/// rows beside it, and if it tops them, with all its reference cells. No two that do are neighbours: here
+/// they are every second cell of every second row. In the rows between, which cannot have any, every second
+/// cell is a maximum of its row and as strong as it may be.
 void make_worst(dsp::PowerMap& map, std::int32_t threshold) {
     for (std::size_t r = 0; r < dsp::kRangeCells; ++r) {
         for (std::size_t d = 0; d < dsp::kDopplerCells; ++d) {
-            const bool maximum = r % 2 == 0 && d % 2 == 0;
-            map.cell[r][d] = static_cast<std::uint16_t>(20'000 + (maximum ? threshold + 1 : 0));
+            const bool peak = r % 2 == 0 && d % 2 == 0;
+            const bool maximum_of_row = r % 2 == 1 && d % 2 == 1;
+            map.cell[r][d] = static_cast<std::uint16_t>(
+                20'000 + (peak ? threshold + 1 : (maximum_of_row ? threshold : 0)));
         }
     }
 }
