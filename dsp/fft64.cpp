@@ -76,8 +76,9 @@ inline void transform64(Element* data) {
         Pair second = 0;
         take_pair(factors, first, second);
         const auto rounding = static_cast<std::int32_t>(first);
-        to[0] = rotate(saturated_add(even0, odd0), kOne, rounding);
+        const Pair sum = saturated_add(even0, odd0);
         to[8 * 4] = rotate(saturated_sub(even0, odd0), second, rounding);
+        to[0] = rotate(sum, kOne, rounding);
         take_pair(factors, first, second);
         to[8 * 2] = rotate(saturated_sub_j(even2, odd2), first, rounding);
         to[8 * 6] = rotate(saturated_add_j(even2, odd2), second, rounding);
