@@ -149,16 +149,15 @@ int ChirpTaper::apply(std::array<Complex16, kChirps>& row) const {
 
 void doppler_transform(Spectrum& spectrum, const ChirpTaper& taper, int first_range_cell) {
     const auto first = static_cast<std::size_t>(first_range_cell);
-    for (std::size_t r = first; r < first + kFftRows; ++r) {
-        spectrum.row_exponent[r] = static_cast<std::int16_t>(taper.apply(spectrum.row[r]) + kFftExponent);
+    const std::span<Spectrum64, kFftRows> rows(&spectrum.row[first], kFftRows);
+    for (std::size_t i = 0; i < kFftRows; ++i) {
+        spectrum.row_exponent[first + i] = static_cast<std::int16_t>(taper.apply(rows[i]) + kFftExponent);
     }
-    fft64_rows(std::span<Spectrum64, kFftRows>(&spectrum.row[first], kFftRows));
+    fft64_rows(rows);
     // The taper rounds down: half a step in each of 64 chirps, in standstill alone.
     constexpr std::uint16_t kBias = kFftLength / 2 >> kFftExponent;
-    for (std::size_t r = first; r < first + kFftRows; ++r) {
-        Complex16& standstill = spectrum.row[r][0];
-        standstill =
-            std::bit_cast<Complex16>(packed::add(std::bit_cast<Pair>(standstill), packed::both(kBias)));
+    for (Spectrum64& row : rows) {
+        row[0] = std::bit_cast<Complex16>(packed::add(std::bit_cast<Pair>(row[0]), packed::both(kBias)));
     }
 }
 
