@@ -29,8 +29,9 @@
 namespace tracking {
 
 inline constexpr int kMaxTentative = kMaxTracks - kMaxConfirmed;
-/// Pairs of measurements near in range rate that are looked at to start tracks, a frame; measurements beyond
-/// that wait. Only a road where nearly everything has one range rate has more.
+/// Once so many pairs of measurements near in range rate have been looked at to start tracks, the
+/// measurements left wait for the next frame. Only a road where nearly everything has one range rate has
+/// more.
 inline constexpr int kMaxStartPairs = 1024;
 
 template <class S>
