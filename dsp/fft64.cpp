@@ -76,7 +76,7 @@ inline void transform64(Element* data) {
         Pair second = 0;
         take_pair(factors, first, second);
         const auto rounding = static_cast<std::int32_t>(first);
-        const Pair sum = saturated_add(even0, odd0);
+        const Word sum = saturated_add(even0, odd0);
         to[8 * 4] = rotate(saturated_sub(even0, odd0), second, rounding);
         to[0] = rotate(sum, kOne, rounding);
         take_pair(factors, first, second);
@@ -115,8 +115,8 @@ void fft64(std::span<Complex16, kFftLength> data) {
     transform64(data.data());
 }
 
-void fft64_rows(std::span<Spectrum64, kFftRows> rows) {
 #if DSP_PACKED_FOUR
+void fft64_rows(std::span<Spectrum64, kFftRows> rows) {
     std::array<packed::Quad, kFftLength> columns;
     for (std::size_t n = 0; n < kFftLength; n += 4) {
         packed::load_transposed(&rows[0][n], kFftLength, &columns[n]);
@@ -125,9 +125,7 @@ void fft64_rows(std::span<Spectrum64, kFftRows> rows) {
     for (std::size_t n = 0; n < kFftLength; n += 4) {
         packed::store_transposed(&columns[n], &rows[0][n], kFftLength);
     }
-#else
-    fft64(rows[0]);
-#endif
 }
+#endif
 
 }  // namespace dsp

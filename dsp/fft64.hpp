@@ -40,6 +40,12 @@ void fft64(std::span<Complex16, kFftLength> data);
 
 /// As many at once as the machine's words hold, with the same bits: one on a board, four on a PC.
 inline constexpr std::size_t kFftRows = DSP_PACKED_FOUR ? 4 : 1;
+#if DSP_PACKED_FOUR
 void fft64_rows(std::span<Spectrum64, kFftRows> rows);
+#else
+inline void fft64_rows(std::span<Spectrum64, kFftRows> rows) {
+    fft64(rows[0]);
+}
+#endif
 
 }  // namespace dsp

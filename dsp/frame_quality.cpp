@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "dsp/packed.hpp"
+#include "dsp/packed_x86.hpp"
 #include "dsp/unrolled.hpp"
 
 namespace dsp {
@@ -21,6 +22,26 @@ struct ChirpPass {
     std::int32_t sum;
 };
 
+#if DSP_PACKED_FOUR
+inline ChirpPass pass_over(const std::array<std::int16_t, kSamples>& chirp) {
+    const packed::Quad ones(packed::pack(1, 1));
+    packed::Quad low = packed::load_quad(chirp.data());
+    packed::Quad high = low;
+    packed::Sum4 sum = packed::dot(low, ones, 0);
+    for (std::size_t n = 8; n < kSamples; n += 8) {
+        const packed::Quad samples = packed::load_quad(&chirp[n]);
+        low = packed::smallest(low, samples);
+        high = packed::largest(high, samples);
+        sum = packed::dot(samples, ones, sum);
+    }
+    const auto add_words = [](packed::Quad a, packed::Quad b) {
+        return packed::Quad(_mm_add_epi32(a.v, b.v));
+    };
+    return {packed::across_words(low, [](auto a, auto b) { return packed::smallest(a, b); }),
+            packed::across_words(high, [](auto a, auto b) { return packed::largest(a, b); }),
+            static_cast<std::int32_t>(packed::across_words(packed::Quad(sum.v), add_words))};
+}
+#else
 /// Adds four samples to it.
 inline void take(const std::int16_t* samples, ChirpPass& pass) {
     constexpr Pair kOnes = packed::pack(1, 1);
@@ -44,6 +65,7 @@ inline ChirpPass pass_over(const std::array<std::int16_t, kSamples>& chirp) {
     }
     return pass;
 }
+#endif
 
 /// A polynomial in an odd number, modulo 2^32: two frames that differ have the same value with a chance of
 /// 2^-32, never if they differ in one coefficient alone.

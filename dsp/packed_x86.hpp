@@ -38,6 +38,10 @@ struct Quad {
     Quad(Pair x) : v(_mm_set1_epi32(static_cast<int>(x))) {}  // NOLINT(google-explicit-constructor): as above
 };
 
+/// Eight samples next to each other in memory.
+inline Quad load_quad(const std::int16_t* samples) {
+    return Quad(_mm_loadu_si128(reinterpret_cast<const __m128i*>(samples)));
+}
 /// Words i .. i + 3 of four rows, `stride` words from one to the next, to Quads i .. i + 3.
 template <class T>
 void load_transposed(const T* rows, std::size_t stride, Quad* columns) {
@@ -101,6 +105,12 @@ inline Quad add(Quad a, Quad b) {
 inline Quad sub(Quad a, Quad b) {
     return Quad(_mm_sub_epi16(a.v, b.v));
 }
+inline Quad smallest(Quad a, Quad b) {
+    return Quad(_mm_min_epi16(a.v, b.v));
+}
+inline Quad largest(Quad a, Quad b) {
+    return Quad(_mm_max_epi16(a.v, b.v));
+}
 inline Quad saturated_add(Quad a, Quad b) {
     return Quad(_mm_adds_epi16(a.v, b.v));
 }
@@ -161,6 +171,15 @@ inline Sum4 dot_cross(Quad a, Quad b, Sum4 sum) {
 }
 inline Sum4 dot_cross_minus(Quad a, Quad b, Sum4 sum) {
     return dot(a, detail::conjugate(swap(b)), sum);
+}
+/// The four words to one.
+template <class Combine>
+Pair across_words(Quad a, Combine combine) {
+    constexpr int kSwapHalves = 0b01'00'11'10;
+    constexpr int kSwapNeighbours = 0b10'11'00'01;
+    a = combine(a, Quad(_mm_shuffle_epi32(a.v, kSwapHalves)));
+    a = combine(a, Quad(_mm_shuffle_epi32(a.v, kSwapNeighbours)));
+    return static_cast<Pair>(_mm_cvtsi128_si32(a.v));
 }
 inline std::array<Quad, 8> load_8(const Quad* from) {
     return {from[0], from[1], from[2], from[3], from[4], from[5], from[6], from[7]};

@@ -257,9 +257,9 @@ void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* ou
     second_pass(rows, out);
 }
 
+#if DSP_PACKED_FOUR
 void range_fft_pairs(std::span<const ChirpPair, kChirpPairs> pairs, const RangeWindow& window,
                      Complex16* out) {
-#if DSP_PACKED_FOUR
     const int exponent = pairs[0].exponent;
     const int up = kHighestExponent - exponent;
     if (up >= 0 && std::ranges::all_of(pairs, [&](const ChirpPair& p) { return p.exponent == exponent; })) {
@@ -277,11 +277,11 @@ void range_fft_pairs(std::span<const ChirpPair, kChirpPairs> pairs, const RangeW
         second_pass(rows, out);
         return;
     }
-#endif
     for (const ChirpPair& pair : pairs) {
         range_fft(pair, window, out);
         out += 2;
     }
 }
+#endif
 
 }  // namespace dsp

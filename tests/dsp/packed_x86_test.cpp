@@ -73,6 +73,10 @@ TEST(PackedX86, EveryOperationIsItsTwinFourTimes) {
         same(sub_j(qa, qb), [&](std::size_t k) { return sub_j(a[k], b[k]); });
         same(half_add_j(qa, qb), [&](std::size_t k) { return half_add_j(a[k], b[k]); });
         same(half_sub_j(qa, qb), [&](std::size_t k) { return half_sub_j(a[k], b[k]); });
+        same(smallest(qa, qb), [&](std::size_t k) { return smallest(a[k], b[k]); });
+        same(largest(qa, qb), [&](std::size_t k) { return largest(a[k], b[k]); });
+        UNSIGNED_LONGS_EQUAL(smallest(smallest(a[0], a[1]), smallest(a[2], a[3])),
+                             across_words(qa, [](Quad x, Quad y) { return smallest(x, y); }));
         same(saturated_add(qa, qb), [&](std::size_t k) { return saturated_add(a[k], b[k]); });
         same(saturated_sub(qa, qb), [&](std::size_t k) { return saturated_sub(a[k], b[k]); });
         same(saturated_add_j(qa, qb), [&](std::size_t k) { return saturated_add_j(a[k], b[k]); });
@@ -104,6 +108,11 @@ TEST(PackedX86, RowsAreTransposedAndBack) {
     std::array<Pair, 4 * 6> back{};
     store_transposed(columns.data(), &back[1], 6);
     for (std::size_t i = 0; i < rows.size(); ++i) UNSIGNED_LONGS_EQUAL(i % 6 % 5 == 0 ? 0 : rows[i], back[i]);
+}
+
+TEST(PackedX86, SamplesComeInOrder) {
+    const std::array<std::int16_t, 8> samples{1, -2, 3, -4, 5, -6, 7, -8};
+    CHECK((words(load_quad(samples.data())) == Four{pack(1, -2), pack(3, -4), pack(5, -6), pack(7, -8)}));
 }
 
 TEST(PackedX86, ConstantsAreTheSameInAllFour) {
