@@ -41,7 +41,7 @@ template <class Element>
 inline void transform64(Element* data) {
     using namespace packed;
     using Word = decltype(load(*data));
-    alignas(8) std::array<Word, kFftLength> rows;  // [k][n]
+    alignas(8) alignas(Word) std::array<Word, kFftLength> rows;  // [k][n]
     Word* to = rows.data();
     const Element* from = data;
     const Pair* factors = &kColumns[0].rounding;

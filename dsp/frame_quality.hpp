@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "dsp/beat_frame.hpp"
-#include "dsp/dc_removal.hpp"
+#include "dsp/dc_levels.hpp"
 #include "dsp/range_doppler.hpp"
 
 namespace dsp {

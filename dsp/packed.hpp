@@ -115,9 +115,6 @@ constexpr Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
 constexpr Pair at_least(Pair a, Pair b) {
     return ((a & 0xFFFFU) >= (b & 0xFFFFU) ? 1U : 0U) | (a >> 16 >= b >> 16 ? 0x10000U : 0U);
 }
-constexpr Pair where_at_least(Pair a, Pair b, Pair value) {
-    return value & (0xFFFFU * at_least(a, b));
-}
 constexpr void order(Pair& low, Pair& high) {
     const Pair swapped = 0xFFFFU * at_least(low, high);
     const Pair change = (low ^ high) & swapped;
@@ -304,11 +301,6 @@ inline Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
 inline Pair at_least(Pair a, Pair b) {
     (void)__usub16(a, b);  // sets a flag for each byte that does not borrow
     return __sel(0x00010001U, 0U);
-}
-/// `value` in each lane where a >= b, both unsigned; else zero.
-inline Pair where_at_least(Pair a, Pair b, Pair value) {
-    (void)__usub16(a, b);
-    return __sel(value, 0U);
 }
 /// Lane by lane, of unsigned numbers: the smaller to `low`, the larger to `high`.
 inline void order(Pair& low, Pair& high) {

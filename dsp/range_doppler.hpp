@@ -7,7 +7,7 @@
 #include <span>
 
 #include "dsp/beat_frame.hpp"
-#include "dsp/dc_removal.hpp"
+#include "dsp/dc_levels.hpp"
 #include "dsp/fft64.hpp"
 #include "dsp/window.hpp"
 

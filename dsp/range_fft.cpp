@@ -4,7 +4,7 @@
 #include <bit>
 #include <cstddef>
 
-#include "dsp/dc_removal.hpp"
+#include "dsp/dc_levels.hpp"
 #include "dsp/fixed_point.hpp"
 #include "dsp/radix8.hpp"
 

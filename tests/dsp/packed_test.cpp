@@ -58,7 +58,6 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     const int v1 = b1 & 0xFFFF;
     const auto where = [](bool here, int x) { return wrap16(here ? x : 0); };
     lanes(where(u0 >= v0, 1), where(u1 >= v1, 1), at_least(a, b));
-    lanes(where(u0 >= v0, 7), where(u1 >= v1, -9), where_at_least(a, b, pack(7, -9)));
     Pair low = a;
     Pair high = b;
     order(low, high);

@@ -1,4 +1,5 @@
-/// Removal of the converter's offset and of the transmitter's leakage, and the scale of what remains.
+/// What the removal of a frame's DC levels needs: the converter's offset and the transmitter's leakage, and
+/// the scale of what remains.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +10,6 @@
 
 #include "dsp/beat_frame.hpp"
 #include "dsp/fft64.hpp"
-#include "dsp/window.hpp"
 
 namespace dsp {
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "dsp/dc_removal.hpp"
+#include "dsp/dc_levels.hpp"
 #include "dsp/frame_quality.hpp"
 
 #include <CppUTest/TestHarness.h>
@@ -25,7 +25,7 @@ dsp::DcLevels levels_of(const dsp::BeatFrame& frame) {
 
 }  // namespace
 
-TEST_GROUP(DcRemoval) {
+TEST_GROUP(DcLevels) {
     dsp::BeatFrame frame;
 
     void fill(int scale) {
@@ -41,7 +41,7 @@ TEST_GROUP(DcRemoval) {
     }
 };
 
-TEST(DcRemoval, SumsAreExact) {
+TEST(DcLevels, SumsAreExact) {
     for (const int scale : {1, 3, 100, 2047, 32767}) {
         fill(scale);
         const auto sum = levels_of(frame).sum;
@@ -51,7 +51,7 @@ TEST(DcRemoval, SumsAreExact) {
     }
 }
 
-TEST(DcRemoval, TheExponentIsThatOfTheLargestDeviation) {
+TEST(DcLevels, TheExponentIsThatOfTheLargestDeviation) {
     for (const int scale : {1, 5, 60, 700, 9000, 32767}) {
         fill(scale);
         const auto got = levels_of(frame).exponent;
@@ -71,7 +71,7 @@ TEST(DcRemoval, TheExponentIsThatOfTheLargestDeviation) {
     }
 }
 
-TEST(DcRemoval, ExponentsOfTheLargestAndTheSmallestDeviation) {
+TEST(DcLevels, ExponentsOfTheLargestAndTheSmallestDeviation) {
     // 63 samples at one end and one at the other: 65535 * 63/64.
     for (const int sign : {-1, 1}) {
         for (auto& chirp : frame.chirp) {
@@ -86,7 +86,7 @@ TEST(DcRemoval, ExponentsOfTheLargestAndTheSmallestDeviation) {
     LONGS_EQUAL(-11, levels_of(frame).exponent[2]);
 }
 
-TEST(DcRemoval, ABurstHasItsOwnScaleAndTheOthersShareOne) {
+TEST(DcLevels, ABurstHasItsOwnScaleAndTheOthersShareOne) {
     fill(200);
     for (auto& s : frame.chirp[21]) s = static_cast<std::int16_t>(100 * s);
     for (auto& s : frame.chirp[40]) s = static_cast<std::int16_t>(s / 2);
