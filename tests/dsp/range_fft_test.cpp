@@ -52,7 +52,7 @@ TEST_GROUP(RangeFft) {
         for (Complex& s : spectrum) s = std::ldexp(1.0, -exponent - dsp::kRangeFftExponent) * s;
         return spectrum;
     }
-    const std::array<dsp::Complex16, 32 * 64>& run(int exponent) {
+    const std::array<dsp::Complex16, 32 * 64>& transformed(int exponent) {
         out.fill({kUntouched, kUntouched});
         dsp::range_fft(pair(exponent), dsp::RangeWindow(window), out.data());
         return out;
@@ -61,7 +61,7 @@ TEST_GROUP(RangeFft) {
     /// a step for factors just below one; in cell 0 also its bias and what rounding the mean by an eighth of
     /// a step gives 32 times.
     void check(int exponent) {
-        run(exponent);
+        transformed(exponent);
         for (std::size_t c = 0; c < 2; ++c) {
             const auto expected = exact(c, exponent);
             for (std::size_t k = 0; k < 32; ++k) {
@@ -104,7 +104,7 @@ TEST(RangeFft, NoiseIsAsStatedAndBiasNone) {
             }
             const int exponent = smallest_exponent();
             dither = static_cast<dsp::packed::Pair>(t % 2);
-            run(exponent);
+            transformed(exponent);
             for (std::size_t c = 0; c < 2; ++c) {
                 const auto expected = exact(c, exponent);
                 for (std::size_t k = 0; k < 32; ++k) {
@@ -174,7 +174,7 @@ TEST(RangeFft, ConstantChirpsBecomeZero) {
     for (const int level : {-32768, -1, 0, 1234, 32767}) {
         samples.fill(static_cast<std::int16_t>(level));
         for (dither = 0; dither < 2; ++dither) {
-            run(-11);
+            transformed(-11);
             for (std::size_t k = 0; k < 32; ++k) {
                 CHECK(out[64 * k] == dsp::Complex16{} && out[64 * k + 1] == dsp::Complex16{});
             }
