@@ -12,7 +12,7 @@ kind=${2:-sh}
 commands=$(awk -v fence="\`\`\`$kind" '$0 == fence {on = 1; next} /^```/ {on = 0} on' README.md)
 [ -n "$commands" ] || { echo "README.md has no \`\`\`$kind block" >&2; exit 1; }
 # radar_study rightly refuses to go on with what an earlier version of it began.
-rm -rf out/lee2000
+[ "$kind" != sh ] || rm -rf out/lee2000
 log=$(mktemp)
 count=0
 while IFS= read -r line; do
