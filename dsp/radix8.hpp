@@ -61,7 +61,7 @@ Word rotate_whole(Word a, Pair w) {
 }
 
 /// Which levels of three halve. Sums that do not are clipped where they can exceed 16 bits.
-enum class Halving : std::uint8_t { none, second, second_and_third };
+enum class Halving : std::uint8_t { second, second_and_third };
 
 /// 8-point transform, radix-2 decimation in time written out: X[k], X[k + 4] for k = 0..3 to emit(k, X[k],
 /// X[k + 4]). In the order that needs few registers.
@@ -69,7 +69,6 @@ template <Halving kHalving, class Load, class Emit>
 inline void transform(Load x, Emit emit) {
     using namespace packed;
     using Word = decltype(x(0));
-    constexpr bool kSecond = kHalving != Halving::none;
     constexpr bool kThird = kHalving == Halving::second_and_third;
     const Word x0 = x(0);
     const Word x4 = x(4);
@@ -79,10 +78,10 @@ inline void transform(Load x, Emit emit) {
     const Word x6 = x(6);
     const Word a2 = saturated_add(x2, x6);
     const Word a3 = saturated_sub(x2, x6);
-    const Word even0 = kSecond ? half_add(a0, a2) : add(a0, a2);
-    const Word even2 = kSecond ? half_sub(a0, a2) : sub(a0, a2);
-    const Word even1 = kSecond ? half_sub_j(a1, a3) : sub_j(a1, a3);
-    const Word even3 = kSecond ? half_add_j(a1, a3) : add_j(a1, a3);
+    const Word even0 = half_add(a0, a2);
+    const Word even2 = half_sub(a0, a2);
+    const Word even1 = half_sub_j(a1, a3);
+    const Word even3 = half_add_j(a1, a3);
     const Word x1 = x(1);
     const Word x5 = x(5);
     const Word b0 = saturated_add(x1, x5);
@@ -91,8 +90,8 @@ inline void transform(Load x, Emit emit) {
     const Word x7 = x(7);
     const Word b2 = saturated_add(x3, x7);
     const Word b3 = saturated_sub(x3, x7);
-    const Word odd0 = kSecond ? half_add(b0, b2) : add(b0, b2);
-    const Word odd2 = kSecond ? half_sub(b0, b2) : sub(b0, b2);
+    const Word odd0 = half_add(b0, b2);
+    const Word odd2 = half_sub(b0, b2);
     const auto last = [&emit](std::size_t k, Word a, Word b) {
         emit(k, kThird ? half_add(a, b) : saturated_add(a, b), kThird ? half_sub(a, b) : saturated_sub(a, b));
     };
@@ -101,8 +100,8 @@ inline void transform(Load x, Emit emit) {
              kThird ? half_add_j(a, b) : saturated_add_j(a, b));
     };
     const auto eighth = [](Word sum, Word halved_sum) {
-        if constexpr (kHalving == Halving::second) return rotate(sum, kEighth);
-        return rotate_whole(kSecond ? halved_sum : sum, kEighth);
+        if constexpr (!kThird) return rotate(sum, kEighth);
+        return rotate_whole(halved_sum, kEighth);
     };
     last(0, even0, odd0);
     last_j(2, even2, odd2);
