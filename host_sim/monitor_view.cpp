@@ -2,6 +2,7 @@
 
 #include <cstdarg>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "host_sim/bus_load.hpp"

@@ -1,7 +1,7 @@
 /// What a BusMonitor knows, for the terminal and for other programs.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "host_sim/bus_monitor.hpp"

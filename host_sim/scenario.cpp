@@ -1,6 +1,7 @@
 #include "host_sim/scenario.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 namespace sim {

@@ -2,6 +2,7 @@
 
 #include <ctime>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "host_sim/json_fields.hpp"
 

@@ -1,6 +1,7 @@
 #include "host_sim/summary.hpp"
 
 #include <iomanip>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 namespace sim {

@@ -1,7 +1,7 @@
 /// The result of a run for people and for scripts.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "host_sim/simulation.hpp"

@@ -46,8 +46,7 @@ run_tests host -j "$jobs" -LE vcan
 run_tests host-clang -L bit-exact
 run_tests host-debug -j "$jobs"
 for board in $boards; do run_tests "$board" -j "$jobs"; done
-# Emulators within an emulator: one after the other.
-run_tests host -L vcan
+run_tests host -j "$jobs" -L vcan
 
 echo "$total_passed passed, $total_failed failed, $total_skipped skipped"
 [ "$total_failed" -eq 0 ]
