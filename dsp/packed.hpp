@@ -215,9 +215,18 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
     std::memcpy(words.data(), from, sizeof words);
     return words;
 }
+inline std::array<Pair, 8> take_8(const Pair*& from) {
+    const Pair* const words = from;
+    from += 8;
+    return load_8(words);
+}
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {
     load_pair(from, first, second);
     from += 2;
+}
+template <class T>
+constexpr T in_register(T a) {
+    return a;
 }
 }  // namespace portable
 
@@ -470,6 +479,28 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
         : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h)
         : "r"(from), "m"(*reinterpret_cast<const std::array<Pair, 8>*>(from)));
     return {a, b, c, d, e, f, g, h};
+}
+/// The same; the pointer then points behind them.
+inline std::array<Pair, 8> take_8(const Pair*& from) {
+    register Pair a asm("r4");
+    register Pair b asm("r5");
+    register Pair c asm("r6");
+    register Pair d asm("r8");
+    register Pair e asm("r9");
+    register Pair f asm("r10");
+    register Pair g asm("r11");
+    register Pair h asm("r12");
+    asm volatile("ldmia %8!, {r4, r5, r6, r8, r9, r10, r11, r12}"
+                 : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h), "+r"(from)
+                 :
+                 : "memory");
+    return {a, b, c, d, e, f, g, h};
+}
+/// a, of which the compiler does not know what it is: a constant stays in a register through a loop.
+template <class T>
+T in_register(T a) {
+    asm("" : "+r"(a));
+    return a;
 }
 /// The next two of a table, in words.
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {

@@ -189,4 +189,8 @@ TEST(Packed, TablesAreReadInOrder) {
     UNSIGNED_LONGS_EQUAL(table[2], second);
     const auto eight = load_8(&table[1]);
     for (std::size_t i = 0; i < 8; ++i) UNSIGNED_LONGS_EQUAL(table[i + 1], eight[i]);
+    next = &table[1];
+    CHECK(take_8(next) == eight);
+    POINTERS_EQUAL(&table[9], next);
+    UNSIGNED_LONGS_EQUAL(table[2], in_register(table[2]));
 }
