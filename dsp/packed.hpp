@@ -199,6 +199,10 @@ void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
     from += 4 * sizeof a / sizeof(T);
 }
 template <class T>
+void take_four_beside(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    take_four(from, a, b, c, d);
+}
+template <class T>
 void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
     const std::array<Pair, 4> words{a, b, c, d};
     std::memcpy(static_cast<void*>(to), words.data(), sizeof words);
@@ -215,10 +219,13 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
     std::memcpy(words.data(), from, sizeof words);
     return words;
 }
-inline std::array<Pair, 8> take_8(const Pair*& from) {
-    const Pair* const words = from;
-    from += 8;
-    return load_8(words);
+template <class T>
+std::array<Pair, 8> take_8(const T*& from) {
+    static_assert(4 % sizeof(T) == 0);
+    std::array<Pair, 8> words;
+    std::memcpy(words.data(), from, sizeof words);
+    from += sizeof words / sizeof(T);
+    return words;
 }
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {
     load_pair(from, first, second);
@@ -434,6 +441,23 @@ void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
     c = c_in;
     d = d_in;
 }
+/// The same in other registers, so that four from load_four stay where they are.
+template <class T>
+void take_four_beside(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r8");
+    register Pair b_in asm("r9");
+    register Pair c_in asm("r10");
+    register Pair d_in asm("r11");
+    asm volatile("ldmia %4!, {%0, %1, %2, %3}"
+                 : "=r"(a_in), "=r"(b_in), "=r"(c_in), "=r"(d_in), "+r"(from)
+                 :
+                 : "memory");
+    a = a_in;
+    b = b_in;
+    c = c_in;
+    d = d_in;
+}
 template <class T>
 void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
     static_assert(4 % sizeof(T) == 0);
@@ -481,7 +505,9 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
     return {a, b, c, d, e, f, g, h};
 }
 /// The same; the pointer then points behind them.
-inline std::array<Pair, 8> take_8(const Pair*& from) {
+template <class T>
+std::array<Pair, 8> take_8(const T*& from) {
+    static_assert(4 % sizeof(T) == 0);
     register Pair a asm("r4");
     register Pair b asm("r5");
     register Pair c asm("r6");

@@ -19,6 +19,8 @@ namespace {
 using packed::Pair;
 
 constexpr int kWindowBits = 15;
+constexpr int kLowerHalf =
+    1;  ///< a row scaled by 2^-1 or more finds its numbers in the lower half of products
 
 /// Windows that add up to more than one over half their length (rectangular, Hamming) leave one bit less to
 /// the data.
@@ -30,12 +32,10 @@ int guard_bits(const Window& window) {
 int magnitude_bits(const Complex16* row) {
     Pair spreads = 0;
     for (const Complex16* const end = row + kChirps; row != end;) {
-        Pair a = 0;
-        Pair b = 0;
-        Pair c = 0;
-        Pair d = 0;
-        packed::take_four(row, a, b, c, d);
-        spreads |= packed::spread(a) | packed::spread(b) | packed::spread(c) | packed::spread(d);
+        const auto [a, b, c, d, e, f, g, h] = packed::take_8(row);
+        using packed::spread;
+        spreads |=
+            spread(a) | spread(b) | spread(c) | spread(d) | spread(e) | spread(f) | spread(g) | spread(h);
     }
     return packed::magnitude_bits(spreads);
 }
@@ -55,34 +55,34 @@ int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
 }
 
 template <bool kUpperHalf>
-Pair product(Pair x, std::int32_t weight) {
-    const std::int32_t re = packed::scale_0(weight, x);
-    const std::int32_t im = packed::scale_1(weight, x);
+Pair product(Pair x, Pair weight) {
+    const std::int32_t re = packed::scale_0(static_cast<std::int32_t>(weight), x);
+    const std::int32_t im = packed::scale_1(static_cast<std::int32_t>(weight), x);
     return kUpperHalf ? packed::pack_high(re, im) : packed::pack_low(re, im);
 }
 
 template <bool kUpperHalf>
-inline void scale_four(Complex16*& row, const std::int32_t*& weight, int shift) {
+inline void scale_four(Complex16*& row, const std::int32_t*& weight) {
     Pair a = 0;
     Pair b = 0;
     Pair c = 0;
     Pair d = 0;
-    packed::take_four(weight, a, b, c, d);
-    const std::int32_t wa = static_cast<std::int32_t>(a) >> shift;
-    const std::int32_t wb = static_cast<std::int32_t>(b) >> shift;
-    const std::int32_t wc = static_cast<std::int32_t>(c) >> shift;
-    const std::int32_t wd = static_cast<std::int32_t>(d) >> shift;
+    Pair wa = 0;
+    Pair wb = 0;
+    Pair wc = 0;
+    Pair wd = 0;
+    packed::take_four_beside(weight, wa, wb, wc, wd);
     packed::load_four(row, a, b, c, d);
     packed::put_four(row, product<kUpperHalf>(a, wa), product<kUpperHalf>(b, wb), product<kUpperHalf>(c, wc),
                      product<kUpperHalf>(d, wd));
 }
 
-/// row[k] = row[k] * weight[k] / 2^(shift + 16), or / 2^shift from the upper half of a product, rounded down.
+/// row[k] = row[k] * weight[k] / 2^16, or / 1 from the upper half of a product, rounded down.
 template <bool kUpperHalf>
-void scale(Complex16* row, const std::int32_t* weight, int shift) {
+void scale(Complex16* row, const std::int32_t* weight) {
     for (const Complex16* const end = row + kChirps; row != end;) {
-        scale_four<kUpperHalf>(row, weight, shift);
-        scale_four<kUpperHalf>(row, weight, shift);
+        scale_four<kUpperHalf>(row, weight);
+        scale_four<kUpperHalf>(row, weight);
     }
 }
 
@@ -136,13 +136,32 @@ ChirpTaper::ChirpTaper(const Window& window, const std::array<std::int16_t, kChi
     }
 }
 
+const ChirpTaper::Weights& ChirpTaper::scaled(int down) const {
+    Scaled& result = scaled_[static_cast<std::size_t>(down) % scaled_.size()];
+    if (result.down != down) {
+        result.down = down;
+        const int shift = down <= kLowerHalf ? kWindowBits + down : down - 1;
+        const std::int32_t* from = weight_.data();
+        for (std::int32_t* to = result.weight.data(); to != result.weight.data() + kChirps;) {
+            Pair a = 0;
+            Pair b = 0;
+            Pair c = 0;
+            Pair d = 0;
+            packed::take_four(from, a, b, c, d);
+            packed::put_four(to, a >> shift, b >> shift, c >> shift, d >> shift);
+        }
+    }
+    return result.weight;
+}
+
 int ChirpTaper::apply(std::array<Complex16, kChirps>& row) const {
     const int bits = even_ ? magnitude_bits(row.data()) : magnitude_bits(row.data(), smaller_.data());
     const int down = bits - kFftInputBits + guard_;
-    if (down <= 1) {
-        scale<false>(row.data(), weight_.data(), kWindowBits + down);
+    const std::int32_t* const weight = scaled(down).data();
+    if (down <= kLowerHalf) {
+        scale<false>(row.data(), weight);
     } else {
-        scale<true>(row.data(), weight_.data(), down - 1);
+        scale<true>(row.data(), weight);
     }
     return highest_ + down;
 }

@@ -54,8 +54,20 @@ class ChirpTaper {
     int apply(std::array<Complex16, kChirps>& row) const;
 
   private:
-    std::array<std::int32_t, kChirps> weight_{};       ///< Q31: window * 2^(exponent - highest)
-    std::array<std::uint8_t, kChirps / 2> smaller_{};  ///< highest - exponent
+    using Weights = std::array<std::int32_t, kChirps>;
+
+    /// weight_ scaled for rows that need 2^-down. Rows of a frame need few different ones, most often that of
+    /// a row shortly before: making them for each row takes a quarter more.
+    struct Scaled {
+        int down = kNothing;
+        Weights weight;
+    };
+    static constexpr int kNothing = 1 << 15;
+    const Weights& scaled(int down) const;
+
+    Weights weight_;                                 ///< Q31: window * 2^(exponent - highest)
+    mutable std::array<Scaled, 4> scaled_;           ///< for `down` modulo four
+    std::array<std::uint8_t, kChirps / 2> smaller_;  ///< highest - exponent
     int highest_;
     int guard_;
     bool even_;  ///< all exponents equal
