@@ -125,15 +125,24 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
 }
 
 ChirpTaper::ChirpTaper(const Window& window, const std::array<std::int16_t, kChirps / 2>& exponent)
-    : highest_(*std::ranges::max_element(exponent)),
-      guard_(guard_bits(window)),
-      even_(std::ranges::count(exponent, highest_) == kChirps / 2) {
-    for (std::size_t k = 0; k < kChirps; k += 2) {
-        const int smaller = highest_ - exponent[k / 2];
-        smaller_[k / 2] = static_cast<std::uint8_t>(smaller);
-        weight_[k] = window[k] * (1 << 16) >> smaller;
-        weight_[k + 1] = window[k + 1] * (1 << 16) >> smaller;
+    : guard_(guard_bits(window)) {
+    int highest = exponent[0];
+    for (const int e : exponent) highest = std::max(highest, e);
+    int any = 0;
+    std::uint8_t* smaller_to = smaller_.data();
+    std::int32_t* weight_to = weight_.data();
+    const std::int16_t* two = window.data();
+    for (const int e : exponent) {
+        const int smaller = highest - e;
+        any |= smaller;
+        *smaller_to++ = static_cast<std::uint8_t>(smaller);
+        const Pair weights = packed::load(two);
+        packed::store_pair(weight_to, weights << 16 >> smaller, (weights & 0xFFFF0000U) >> smaller);
+        two += 2;
+        weight_to += 2;
     }
+    highest_ = highest;
+    even_ = any == 0;
 }
 
 const ChirpTaper::Weights& ChirpTaper::scaled(int down) const {
