@@ -220,6 +220,11 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
     return words;
 }
 template <class T>
+void put_pair(T*& to, Pair first, Pair second) {
+    store_pair(to, first, second);
+    to += 2 * sizeof first / sizeof(T);
+}
+template <class T>
 std::array<Pair, 8> take_8(const T*& from) {
     static_assert(4 % sizeof(T) == 0);
     std::array<Pair, 8> words;
@@ -476,6 +481,12 @@ void store_pair(T* to, Pair first, Pair second) {
     static_assert(4 % sizeof(T) == 0);
     using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
     asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
+}
+/// The same; the pointer then points behind them.
+template <class T>
+void put_pair(T*& to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    asm volatile("strd %1, %2, [%0], #8" : "+r"(to) : "r"(first), "r"(second) : "memory");
 }
 /// a + 2^16 b in 32 bits: the compiler makes three instructions of it when a product follows.
 inline std::uint32_t add_shifted(std::uint32_t a, std::uint32_t b) {

@@ -30,12 +30,12 @@ int guard_bits(const Window& window) {
 
 /// Of all numbers of a row.
 int magnitude_bits(const Complex16* row) {
+    using packed::spread;
     Pair spreads = 0;
     for (const Complex16* const end = row + kChirps; row != end;) {
         const auto [a, b, c, d, e, f, g, h] = packed::take_8(row);
-        using packed::spread;
-        spreads |=
-            spread(a) | spread(b) | spread(c) | spread(d) | spread(e) | spread(f) | spread(g) | spread(h);
+        spreads |= spread(a) | spread(b) | spread(c) | spread(d);
+        spreads |= spread(e) | spread(f) | spread(g) | spread(h);
     }
     return packed::magnitude_bits(spreads);
 }
@@ -83,10 +83,13 @@ void scale(Complex16* row, const std::int32_t* weight) {
     for (const Complex16* const end = row + kChirps; row != end;) {
         scale_four<kUpperHalf>(row, weight);
         scale_four<kUpperHalf>(row, weight);
+        if constexpr (kUpperHalf) continue;  // seldom
+        scale_four<kUpperHalf>(row, weight);
+        scale_four<kUpperHalf>(row, weight);
     }
 }
 
-inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t* to) {
+inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t*& to) {
     Pair a = 0;
     Pair b = 0;
     Pair c = 0;
@@ -94,7 +97,7 @@ inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t* 
     packed::take_four(from, a, b, c, d);
     const auto square = [](Pair x) { return static_cast<std::uint32_t>(packed::dot(x, x, 0)); };  // <= 2^31
     const Pair first = log2_coarse_q10(square(a), square(b), bias);
-    packed::store_pair(to, first, log2_coarse_q10(square(c), square(d), bias));
+    packed::put_pair(to, first, log2_coarse_q10(square(c), square(d), bias));
 }
 
 }  // namespace
@@ -194,9 +197,9 @@ void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
     const Pair bias = log2_bias(2 * exponent * kLogOne);
     const Complex16* from = row.data();
     std::uint16_t* to = power.data();
-    for (const Complex16* const end = from + kDopplerCells; from != end; to += 8) {
+    for (const Complex16* const end = from + kDopplerCells; from != end;) {
         log_power_of_four(from, bias, to);
-        log_power_of_four(from, bias, to + 4);
+        log_power_of_four(from, bias, to);
     }
 }
 
