@@ -32,16 +32,17 @@ int guard_bits(const Window& window) {
 int magnitude_bits(const Complex16* row) {
     using packed::spread;
     Pair spreads = 0;
-    for (const Complex16* const end = row + kChirps; row != end;) {
+    const Complex16* const end = row + kChirps;
+    do {
         const auto [a, b, c, d, e, f, g, h] = packed::take_8(row);
         spreads |= spread(a) | spread(b) | spread(c) | spread(d);
         spreads |= spread(e) | spread(f) | spread(g) | spread(h);
-    }
+    } while (row != end);
     return packed::magnitude_bits(spreads);
 }
 
 /// The same of chirps that are smaller by their number of bits; at least 1.
-int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
+[[gnu::noinline]] int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
     constexpr int kUp = 16;  // both lanes, one over the other, in the upper half: nothing is lost below
     std::uint32_t spreads = 2U << kUp;
     unrolled<kChirps, 2, 4>([row, smaller, &spreads](std::size_t k) {
@@ -77,16 +78,29 @@ inline void scale_four(Complex16*& row, const std::int32_t*& weight) {
                      product<kUpperHalf>(d, wd));
 }
 
-/// row[k] = row[k] * weight[k] / 2^16, or / 1 from the upper half of a product, rounded down.
+/// row[k] = row[k] * weight[k] / 2^16, or / 2^32, rounded down.
 template <bool kUpperHalf>
 void scale(Complex16* row, const std::int32_t* weight) {
-    for (const Complex16* const end = row + kChirps; row != end;) {
+    const std::int32_t* const end = packed::in_register(weight + kChirps);
+    do {
         scale_four<kUpperHalf>(row, weight);
         scale_four<kUpperHalf>(row, weight);
         if constexpr (kUpperHalf) continue;  // seldom
         scale_four<kUpperHalf>(row, weight);
         scale_four<kUpperHalf>(row, weight);
-    }
+    } while (weight != end);
+}
+
+[[gnu::noinline]] void shift_right(const std::int32_t* from, int shift, std::int32_t* to) {
+    const std::int32_t* const end = from + kChirps;
+    do {
+        Pair a = 0;
+        Pair b = 0;
+        Pair c = 0;
+        Pair d = 0;
+        packed::take_four(from, a, b, c, d);
+        packed::put_four(to, a >> shift, b >> shift, c >> shift, d >> shift);
+    } while (from != end);
 }
 
 inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t*& to) {
@@ -148,32 +162,20 @@ ChirpTaper::ChirpTaper(const Window& window, const std::array<std::int16_t, kChi
     even_ = any == 0;
 }
 
-const ChirpTaper::Weights& ChirpTaper::scaled(int down) const {
-    Scaled& result = scaled_[static_cast<std::size_t>(down) % scaled_.size()];
-    if (result.down != down) {
-        result.down = down;
-        const int shift = down <= kLowerHalf ? kWindowBits + down : down - 1;
-        const std::int32_t* from = weight_.data();
-        for (std::int32_t* to = result.weight.data(); to != result.weight.data() + kChirps;) {
-            Pair a = 0;
-            Pair b = 0;
-            Pair c = 0;
-            Pair d = 0;
-            packed::take_four(from, a, b, c, d);
-            packed::put_four(to, a >> shift, b >> shift, c >> shift, d >> shift);
-        }
-    }
-    return result.weight;
-}
-
 int ChirpTaper::apply(std::array<Complex16, kChirps>& row) const {
     const int bits = even_ ? magnitude_bits(row.data()) : magnitude_bits(row.data(), smaller_.data());
     const int down = bits - kFftInputBits + guard_;
-    const std::int32_t* const weight = scaled(down).data();
-    if (down <= kLowerHalf) {
-        scale<false>(row.data(), weight);
+    const std::size_t place = static_cast<std::size_t>(down) % kScaled;
+    Weights& weight = scaled_[place];
+    const bool lower_half = down <= kLowerHalf;
+    if (scaled_down_[place] != down) {
+        scaled_down_[place] = down;
+        shift_right(weight_.data(), lower_half ? kWindowBits + down : down - 1, weight.data());
+    }
+    if (lower_half) {
+        scale<false>(row.data(), weight.data());
     } else {
-        scale<true>(row.data(), weight);
+        scale<true>(row.data(), weight.data());
     }
     return highest_ + down;
 }

@@ -55,18 +55,14 @@ class ChirpTaper {
 
   private:
     using Weights = std::array<std::int32_t, kChirps>;
+    static constexpr std::size_t kScaled = 4;
+    static constexpr int kNone = 1 << 15;
 
-    /// weight_ scaled for rows that need 2^-down. Rows of a frame need few different ones, most often that of
-    /// a row shortly before: making them for each row takes a quarter more.
-    struct Scaled {
-        int down = kNothing;
-        Weights weight;
-    };
-    static constexpr int kNothing = 1 << 15;
-    const Weights& scaled(int down) const;
-
-    Weights weight_;                                 ///< Q31: window * 2^(exponent - highest)
-    mutable std::array<Scaled, 4> scaled_;           ///< for `down` modulo four
+    Weights weight_;  ///< Q31: window * 2^(exponent - highest)
+    /// A frame needs some five, mostly neighbours, and most rows one that a row shortly before needed: each
+    /// at down modulo kScaled.
+    mutable std::array<Weights, kScaled> scaled_;
+    mutable std::array<int, kScaled> scaled_down_{kNone, kNone, kNone, kNone};
     std::array<std::uint8_t, kChirps / 2> smaller_;  ///< highest - exponent
     int highest_;
     int guard_;
