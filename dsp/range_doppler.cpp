@@ -19,8 +19,8 @@ namespace {
 using packed::Pair;
 
 constexpr int kWindowBits = 15;
-constexpr int kLowerHalf =
-    1;  ///< a row scaled by 2^-1 or more finds its numbers in the lower half of products
+/// Rows scaled by 2^-1 or more find their numbers in the lower half of products, others in the upper half.
+constexpr int kLowerHalf = 1;
 
 /// Windows that add up to more than one over half their length (rectangular, Hamming) leave one bit less to
 /// the data.
@@ -91,6 +91,7 @@ void scale(Complex16* row, const std::int32_t* weight) {
     } while (weight != end);
 }
 
+/// to[k] = from[k] / 2^shift, rounded down; none is negative.
 [[gnu::noinline]] void shift_right(const std::int32_t* from, int shift, std::int32_t* to) {
     const std::int32_t* const end = from + kChirps;
     do {
