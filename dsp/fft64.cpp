@@ -82,10 +82,10 @@ inline Turned<Word> eighths(Word b1, Word b3, Pair eighth, std::int32_t half) {
             pack_high(dot(b3, eighth, re), dot_minus(b3, eighth, im))};
 }
 
-/// The first pass's column 0, whose w are all one: sums are halved, 30 instructions less than by products.
-/// What halving odd sums takes from them and kBias gives is seven halves of a step of the first input, so it
-/// gets three or four, by the lowest bits of `random`: the samples' own would not do, a block that was scaled
-/// up has none.
+/// The first pass's column 0, whose w are all one: sums are halved, 25 instructions less than by products.
+/// Halving takes a quarter of a step from sums, on average, and kBias asks for six quarters more: together
+/// seven halves of a step of the first input, which gets three or four, by the lowest bits of `random`. Those
+/// of the samples would not do, a block that was scaled up has none.
 template <class Element, class Word>
 inline void first_column(const Element* from, Word random, Pair eighth, std::int32_t half, Word* to) {
     using namespace packed;
@@ -122,7 +122,7 @@ inline void transform64(Element* data) {
     const Pair* factors = &kColumns[0].rounding;
     std::int32_t rounding = 0;
     Word last;
-    do {
+    do {  // columns 1 to 7, then 0, which wants something random and shares constants with the second pass
         ++from;
         ++to;
         const auto x = [&from](std::size_t m) { return load(from[8 * m]); };
