@@ -199,6 +199,10 @@ void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
     from += 4 * sizeof a / sizeof(T);
 }
 template <class T>
+void take_four_beside(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    take_four(from, a, b, c, d);
+}
+template <class T>
 void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
     const std::array<Pair, 4> words{a, b, c, d};
     std::memcpy(static_cast<void*>(to), words.data(), sizeof words);
@@ -215,9 +219,26 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
     std::memcpy(words.data(), from, sizeof words);
     return words;
 }
+template <class T>
+void put_pair(T*& to, Pair first, Pair second) {
+    store_pair(to, first, second);
+    to += 2 * sizeof first / sizeof(T);
+}
+template <class T>
+std::array<Pair, 8> take_8(const T*& from) {
+    static_assert(4 % sizeof(T) == 0);
+    std::array<Pair, 8> words;
+    std::memcpy(words.data(), from, sizeof words);
+    from += sizeof words / sizeof(T);
+    return words;
+}
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {
     load_pair(from, first, second);
     from += 2;
+}
+template <class T>
+constexpr T in_register(T a) {
+    return a;
 }
 }  // namespace portable
 
@@ -425,6 +446,23 @@ void take_four(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
     c = c_in;
     d = d_in;
 }
+/// The same in other registers, so that four from load_four stay where they are.
+template <class T>
+void take_four_beside(const T*& from, Pair& a, Pair& b, Pair& c, Pair& d) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a_in asm("r8");
+    register Pair b_in asm("r9");
+    register Pair c_in asm("r10");
+    register Pair d_in asm("r11");
+    asm volatile("ldmia %4!, {%0, %1, %2, %3}"
+                 : "=r"(a_in), "=r"(b_in), "=r"(c_in), "=r"(d_in), "+r"(from)
+                 :
+                 : "memory");
+    a = a_in;
+    b = b_in;
+    c = c_in;
+    d = d_in;
+}
 template <class T>
 void put_four(T*& to, Pair a, Pair b, Pair c, Pair d) {
     static_assert(4 % sizeof(T) == 0);
@@ -443,6 +481,12 @@ void store_pair(T* to, Pair first, Pair second) {
     static_assert(4 % sizeof(T) == 0);
     using Words [[gnu::may_alias, gnu::aligned(1)]] = std::uint64_t;
     asm("strd %1, %2, %0" : "=o"(*reinterpret_cast<Words*>(to)) : "r"(first), "r"(second));
+}
+/// The same; the pointer then points behind them.
+template <class T>
+void put_pair(T*& to, Pair first, Pair second) {
+    static_assert(4 % sizeof(T) == 0);
+    asm volatile("strd %1, %2, [%0], #8" : "+r"(to) : "r"(first), "r"(second) : "memory");
 }
 /// a + 2^16 b in 32 bits: the compiler makes three instructions of it when a product follows.
 inline std::uint32_t add_shifted(std::uint32_t a, std::uint32_t b) {
@@ -470,6 +514,30 @@ inline std::array<Pair, 8> load_8(const Pair* from) {
         : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h)
         : "r"(from), "m"(*reinterpret_cast<const std::array<Pair, 8>*>(from)));
     return {a, b, c, d, e, f, g, h};
+}
+/// The same; the pointer then points behind them.
+template <class T>
+std::array<Pair, 8> take_8(const T*& from) {
+    static_assert(4 % sizeof(T) == 0);
+    register Pair a asm("r4");
+    register Pair b asm("r5");
+    register Pair c asm("r6");
+    register Pair d asm("r8");
+    register Pair e asm("r9");
+    register Pair f asm("r10");
+    register Pair g asm("r11");
+    register Pair h asm("r12");
+    asm volatile("ldmia %8!, {r4, r5, r6, r8, r9, r10, r11, r12}"
+                 : "=r"(a), "=r"(b), "=r"(c), "=r"(d), "=r"(e), "=r"(f), "=r"(g), "=r"(h), "+r"(from)
+                 :
+                 : "memory");
+    return {a, b, c, d, e, f, g, h};
+}
+/// a, of which the compiler does not know what it is: a constant stays in a register through a loop.
+template <class T>
+T in_register(T a) {
+    asm("" : "+r"(a));
+    return a;
 }
 /// The next two of a table, in words.
 inline void take_pair(const Pair*& from, Pair& first, Pair& second) {

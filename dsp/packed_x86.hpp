@@ -92,6 +92,9 @@ inline Quad conjugate(Quad a) {
 }
 }  // namespace detail
 
+inline Quad operator&(Quad a, Quad b) {
+    return Quad(_mm_and_si128(a.v, b.v));
+}
 inline Quad swap(Quad a) {
     constexpr int kExchange = 0b10'11'00'01;
     return Quad(_mm_shufflehi_epi16(_mm_shufflelo_epi16(a.v, kExchange), kExchange));
@@ -183,6 +186,11 @@ Pair across_words(Quad a, Combine combine) {
 }
 inline std::array<Quad, 8> load_8(const Quad* from) {
     return {from[0], from[1], from[2], from[3], from[4], from[5], from[6], from[7]};
+}
+inline std::array<Quad, 8> take_8(const Quad*& from) {
+    const Quad* const words = from;
+    from += 8;
+    return load_8(words);
 }
 
 }  // namespace portable

@@ -19,6 +19,8 @@ namespace {
 using packed::Pair;
 
 constexpr int kWindowBits = 15;
+/// Rows scaled by 2^-1 or more find their numbers in the lower half of products, others in the upper half.
+constexpr int kLowerHalf = 1;
 
 /// Windows that add up to more than one over half their length (rectangular, Hamming) leave one bit less to
 /// the data.
@@ -28,20 +30,19 @@ int guard_bits(const Window& window) {
 
 /// Of all numbers of a row.
 int magnitude_bits(const Complex16* row) {
+    using packed::spread;
     Pair spreads = 0;
-    for (const Complex16* const end = row + kChirps; row != end;) {
-        Pair a = 0;
-        Pair b = 0;
-        Pair c = 0;
-        Pair d = 0;
-        packed::take_four(row, a, b, c, d);
-        spreads |= packed::spread(a) | packed::spread(b) | packed::spread(c) | packed::spread(d);
-    }
+    const Complex16* const end = row + kChirps;
+    do {
+        const auto [a, b, c, d, e, f, g, h] = packed::take_8(row);
+        spreads |= spread(a) | spread(b) | spread(c) | spread(d);
+        spreads |= spread(e) | spread(f) | spread(g) | spread(h);
+    } while (row != end);
     return packed::magnitude_bits(spreads);
 }
 
 /// The same of chirps that are smaller by their number of bits; at least 1.
-int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
+[[gnu::noinline]] int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
     constexpr int kUp = 16;  // both lanes, one over the other, in the upper half: nothing is lost below
     std::uint32_t spreads = 2U << kUp;
     unrolled<kChirps, 2, 4>([row, smaller, &spreads](std::size_t k) {
@@ -55,38 +56,55 @@ int magnitude_bits(const Complex16* row, const std::uint8_t* smaller) {
 }
 
 template <bool kUpperHalf>
-Pair product(Pair x, std::int32_t weight) {
-    const std::int32_t re = packed::scale_0(weight, x);
-    const std::int32_t im = packed::scale_1(weight, x);
+Pair product(Pair x, Pair weight) {
+    const std::int32_t re = packed::scale_0(static_cast<std::int32_t>(weight), x);
+    const std::int32_t im = packed::scale_1(static_cast<std::int32_t>(weight), x);
     return kUpperHalf ? packed::pack_high(re, im) : packed::pack_low(re, im);
 }
 
 template <bool kUpperHalf>
-inline void scale_four(Complex16*& row, const std::int32_t*& weight, int shift) {
+inline void scale_four(Complex16*& row, const std::int32_t*& weight) {
     Pair a = 0;
     Pair b = 0;
     Pair c = 0;
     Pair d = 0;
-    packed::take_four(weight, a, b, c, d);
-    const std::int32_t wa = static_cast<std::int32_t>(a) >> shift;
-    const std::int32_t wb = static_cast<std::int32_t>(b) >> shift;
-    const std::int32_t wc = static_cast<std::int32_t>(c) >> shift;
-    const std::int32_t wd = static_cast<std::int32_t>(d) >> shift;
+    Pair wa = 0;
+    Pair wb = 0;
+    Pair wc = 0;
+    Pair wd = 0;
+    packed::take_four_beside(weight, wa, wb, wc, wd);
     packed::load_four(row, a, b, c, d);
     packed::put_four(row, product<kUpperHalf>(a, wa), product<kUpperHalf>(b, wb), product<kUpperHalf>(c, wc),
                      product<kUpperHalf>(d, wd));
 }
 
-/// row[k] = row[k] * weight[k] / 2^(shift + 16), or / 2^shift from the upper half of a product, rounded down.
+/// row[k] = row[k] * weight[k] / 2^16, or / 2^32, rounded down.
 template <bool kUpperHalf>
-void scale(Complex16* row, const std::int32_t* weight, int shift) {
-    for (const Complex16* const end = row + kChirps; row != end;) {
-        scale_four<kUpperHalf>(row, weight, shift);
-        scale_four<kUpperHalf>(row, weight, shift);
-    }
+void scale(Complex16* row, const std::int32_t* weight) {
+    const std::int32_t* const end = packed::in_register(weight + kChirps);
+    do {
+        scale_four<kUpperHalf>(row, weight);
+        scale_four<kUpperHalf>(row, weight);
+        if constexpr (kUpperHalf) continue;  // seldom
+        scale_four<kUpperHalf>(row, weight);
+        scale_four<kUpperHalf>(row, weight);
+    } while (weight != end);
 }
 
-inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t* to) {
+/// to[k] = from[k] / 2^shift, rounded down; none is negative.
+[[gnu::noinline]] void shift_right(const std::int32_t* from, int shift, std::int32_t* to) {
+    const std::int32_t* const end = from + kChirps;
+    do {
+        Pair a = 0;
+        Pair b = 0;
+        Pair c = 0;
+        Pair d = 0;
+        packed::take_four(from, a, b, c, d);
+        packed::put_four(to, a >> shift, b >> shift, c >> shift, d >> shift);
+    } while (from != end);
+}
+
+inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t*& to) {
     Pair a = 0;
     Pair b = 0;
     Pair c = 0;
@@ -94,7 +112,7 @@ inline void log_power_of_four(const Complex16*& from, Pair bias, std::uint16_t* 
     packed::take_four(from, a, b, c, d);
     const auto square = [](Pair x) { return static_cast<std::uint32_t>(packed::dot(x, x, 0)); };  // <= 2^31
     const Pair first = log2_coarse_q10(square(a), square(b), bias);
-    packed::store_pair(to, first, log2_coarse_q10(square(c), square(d), bias));
+    packed::put_pair(to, first, log2_coarse_q10(square(c), square(d), bias));
 }
 
 }  // namespace
@@ -125,24 +143,40 @@ void range_transform(const BeatFrame& frame, const DcLevels& levels, const Windo
 }
 
 ChirpTaper::ChirpTaper(const Window& window, const std::array<std::int16_t, kChirps / 2>& exponent)
-    : highest_(*std::ranges::max_element(exponent)),
-      guard_(guard_bits(window)),
-      even_(std::ranges::count(exponent, highest_) == kChirps / 2) {
-    for (std::size_t k = 0; k < kChirps; k += 2) {
-        const int smaller = highest_ - exponent[k / 2];
-        smaller_[k / 2] = static_cast<std::uint8_t>(smaller);
-        weight_[k] = window[k] * (1 << 16) >> smaller;
-        weight_[k + 1] = window[k + 1] * (1 << 16) >> smaller;
+    : guard_(guard_bits(window)) {
+    int highest = exponent[0];
+    for (const int e : exponent) highest = std::max(highest, e);
+    int any = 0;
+    std::uint8_t* smaller_to = smaller_.data();
+    std::int32_t* weight_to = weight_.data();
+    const std::int16_t* two = window.data();
+    for (const int e : exponent) {
+        const int smaller = highest - e;
+        any |= smaller;
+        *smaller_to++ = static_cast<std::uint8_t>(smaller);
+        const Pair weights = packed::load(two);
+        packed::store_pair(weight_to, weights << 16 >> smaller, (weights & 0xFFFF0000U) >> smaller);
+        two += 2;
+        weight_to += 2;
     }
+    highest_ = highest;
+    even_ = any == 0;
 }
 
 int ChirpTaper::apply(std::array<Complex16, kChirps>& row) const {
     const int bits = even_ ? magnitude_bits(row.data()) : magnitude_bits(row.data(), smaller_.data());
     const int down = bits - kFftInputBits + guard_;
-    if (down <= 1) {
-        scale<false>(row.data(), weight_.data(), kWindowBits + down);
+    const std::size_t place = static_cast<std::size_t>(down) % kScaled;
+    Weights& weight = scaled_[place];
+    const bool lower_half = down <= kLowerHalf;
+    if (scaled_down_[place] != down) {
+        scaled_down_[place] = down;
+        shift_right(weight_.data(), lower_half ? kWindowBits + down : down - 1, weight.data());
+    }
+    if (lower_half) {
+        scale<false>(row.data(), weight.data());
     } else {
-        scale<true>(row.data(), weight_.data(), down - 1);
+        scale<true>(row.data(), weight.data());
     }
     return highest_ + down;
 }
@@ -166,9 +200,9 @@ void log_power(std::span<const Complex16, kDopplerCells> row, int exponent,
     const Pair bias = log2_bias(2 * exponent * kLogOne);
     const Complex16* from = row.data();
     std::uint16_t* to = power.data();
-    for (const Complex16* const end = from + kDopplerCells; from != end; to += 8) {
+    for (const Complex16* const end = from + kDopplerCells; from != end;) {
         log_power_of_four(from, bias, to);
-        log_power_of_four(from, bias, to + 4);
+        log_power_of_four(from, bias, to);
     }
 }
 

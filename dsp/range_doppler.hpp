@@ -54,8 +54,16 @@ class ChirpTaper {
     int apply(std::array<Complex16, kChirps>& row) const;
 
   private:
-    std::array<std::int32_t, kChirps> weight_{};       ///< Q31: window * 2^(exponent - highest)
-    std::array<std::uint8_t, kChirps / 2> smaller_{};  ///< highest - exponent
+    using Weights = std::array<std::int32_t, kChirps>;
+    static constexpr std::size_t kScaled = 4;
+    static constexpr int kNone = 1 << 15;
+
+    Weights weight_;  ///< Q31: window * 2^(exponent - highest)
+    /// A frame needs some five, mostly neighbours, and most rows one that a row shortly before needed: each
+    /// at down modulo kScaled.
+    mutable std::array<Weights, kScaled> scaled_;
+    mutable std::array<int, kScaled> scaled_down_{kNone, kNone, kNone, kNone};
+    std::array<std::uint8_t, kChirps / 2> smaller_;  ///< highest - exponent
     int highest_;
     int guard_;
     bool even_;  ///< all exponents equal

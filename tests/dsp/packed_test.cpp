@@ -141,6 +141,13 @@ TEST(Packed, TwoWordsGoThroughMemory) {
     lanes(5, -6, second);
     store_pair(samples.data(), second, first);
     CHECK((samples == std::array<std::int16_t, 6>{5, -6, 3, -4, 5, -6}));
+    std::int16_t* to = &samples[2];
+    put_pair(to, first, second);
+    POINTERS_EQUAL(samples.data() + 6, to);
+    CHECK((samples == std::array<std::int16_t, 6>{5, -6, 3, -4, 5, -6}));
+    to = samples.data();
+    put_pair(to, first, second);
+    CHECK((samples == std::array<std::int16_t, 6>{3, -4, 5, -6, 5, -6}));
 }
 
 TEST(Packed, FourWordsGoThroughMemory) {
@@ -156,6 +163,12 @@ TEST(Packed, FourWordsGoThroughMemory) {
     load_four(from, a, b, c, d);
     POINTERS_EQUAL(&words[4], from);
     CHECK(a == 5 && b == 6 && c == 7 && d == 8);
+    from = &words[1];
+    take_four_beside(from, a, b, c, d);
+    POINTERS_EQUAL(&words[5], from);
+    CHECK(a == 2 && b == 3 && c == 4 && d == 5);
+    from = &words[4];
+    take_four(from, a, b, c, d);
     std::uint32_t* to = &words[1];
     put_four(to, d, c, b, a);
     POINTERS_EQUAL(&words[5], to);
@@ -189,4 +202,8 @@ TEST(Packed, TablesAreReadInOrder) {
     UNSIGNED_LONGS_EQUAL(table[2], second);
     const auto eight = load_8(&table[1]);
     for (std::size_t i = 0; i < 8; ++i) UNSIGNED_LONGS_EQUAL(table[i + 1], eight[i]);
+    next = &table[1];
+    CHECK(take_8(next) == eight);
+    POINTERS_EQUAL(&table[9], next);
+    UNSIGNED_LONGS_EQUAL(table[2], in_register(table[2]));
 }

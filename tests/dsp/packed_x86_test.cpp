@@ -64,6 +64,7 @@ TEST(PackedX86, EveryOperationIsItsTwinFourTimes) {
         const Quad qa = quad(a);
         const Quad qb = quad(b);
         const Quad qw = quad(w);
+        same(qa & qb, [&](std::size_t k) { return a[k] & b[k]; });
         same(swap(qa), [&](std::size_t k) { return swap(a[k]); });
         same(add(qa, qb), [&](std::size_t k) { return add(a[k], b[k]); });
         same(sub(qa, qb), [&](std::size_t k) { return sub(a[k], b[k]); });
