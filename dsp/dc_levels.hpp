@@ -22,7 +22,7 @@ static_assert(kSamples == 1 << kMeanBits);
 /// speed) keeps its beat frequency and is not touched: only range cell 0 is.
 struct DcLevels {
     std::array<std::int32_t, kChirps> sum{};  ///< of the samples of each chirp: 64 times its mean, exact
-    /// Of the deviations of chirps 2i and 2i+1 (which share a transform): deviation = code * 2^exponent, all
+    /// Of the deviations of chirps 2i and 2i+1: deviation = code * 2^exponent, all
     /// codes within +-2^12.
     std::array<std::int16_t, kChirps / 2> exponent{};
 };
@@ -47,8 +47,8 @@ constexpr int deviation_exponent(const ChirpLevel& even, const ChirpLevel& odd) 
     return std::max(bits - kMeanBits - kFftInputBits, kLowest);
 }
 
-/// Exponents within 2 of the largest become the largest: a frame without a burst then has the same scale
-/// everywhere.
+/// Exponents within 2 of the largest become the largest, and so on among the rest: a frame without a burst
+/// then has the same scale everywhere, one with a burst few, each of which costs a window table.
 void share_exponent(std::span<std::int16_t, kChirps / 2> exponent);
 
 }  // namespace dsp

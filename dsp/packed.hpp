@@ -164,11 +164,23 @@ constexpr std::int32_t scale_0(std::int32_t a, Pair b) {
 constexpr std::int32_t scale_1(std::int32_t a, Pair b) {
     return static_cast<std::int32_t>(product(a, lane1(b)) >> 16);
 }
-constexpr std::uint32_t add_shifted(std::uint32_t a, std::uint32_t b) {
-    return a + (b << 16);
+constexpr Pair scale_lanes(Pair a, std::int32_t factor_0, std::int32_t factor_1) {
+    return pack(scale_0(factor_0, a), scale_1(factor_1, a));
 }
-constexpr std::uint32_t multiply_add(std::uint32_t a, std::uint32_t b, std::uint32_t sum) {
-    return a * b + sum;
+constexpr Pair both_lane0(Pair a, Pair b) {
+    return pack(lane0(a), lane0(b));
+}
+constexpr Pair both_lane1(Pair a, Pair b) {
+    return pack(lane1(a), lane1(b));
+}
+constexpr Pair mix_low(std::int32_t upper_to_low, Pair high_from) {
+    return pack(upper_to_low >> 16, lane1(high_from));
+}
+constexpr Pair mix_high(Pair low_from, std::int32_t upper_to_high) {
+    return pack(lane0(low_from), upper_to_high >> 16);
+}
+constexpr Pair upper_half(std::int32_t sum) {
+    return static_cast<Pair>(sum) >> 16;
 }
 constexpr Pair floored_sub(Pair a, Pair b) {
     const auto lane = [](Pair x, Pair y) { return x > y ? x - y : 0U; };
@@ -181,6 +193,9 @@ constexpr void sort(Pair& a, Pair& b) {
 }
 constexpr std::uint32_t left_aligned(std::uint32_t v, int zeros) {
     return zeros < 32 ? v << zeros : 0;
+}
+constexpr std::uint32_t multiply_add(std::uint32_t a, std::uint32_t b, std::uint32_t sum) {
+    return a * b + sum;
 }
 template <class T>
 void load_pair(const T* from, Pair& first, Pair& second) {
@@ -387,6 +402,28 @@ inline std::int32_t scale_1(std::int32_t a, Pair b) {
     asm("smulwt %0, %1, %2" : "=r"(result) : "r"(a), "r"(b));
     return result;
 }
+/// Each lane times a factor of its own, the upper 32 of 48 bits, rounded down; of these the lower 16.
+inline Pair scale_lanes(Pair a, std::int32_t factor_0, std::int32_t factor_1) {
+    return pack_low(scale_0(factor_0, a), scale_1(factor_1, a));
+}
+/// Lane 0 of both words; lane 1 of both.
+inline Pair both_lane0(Pair a, Pair b) {
+    return pack_low(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b));
+}
+inline Pair both_lane1(Pair a, Pair b) {
+    return pack_high(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b));
+}
+/// One lane of a word, the upper half of a sum in the other.
+inline Pair mix_low(std::int32_t upper_to_low, Pair high_from) {
+    return pack_high(upper_to_low, static_cast<std::int32_t>(high_from));
+}
+inline Pair mix_high(Pair low_from, std::int32_t upper_to_high) {
+    return pack_mixed(low_from, static_cast<Pair>(upper_to_high));
+}
+/// The upper half of a sum in lane 0, zero in lane 1.
+inline Pair upper_half(std::int32_t sum) {
+    return static_cast<Pair>(sum) >> 16;
+}
 /// a - b lane by lane, both unsigned, not below zero
 inline Pair floored_sub(Pair a, Pair b) {
     return __uqsub16(a, b);
@@ -487,12 +524,6 @@ template <class T>
 void put_pair(T*& to, Pair first, Pair second) {
     static_assert(4 % sizeof(T) == 0);
     asm volatile("strd %1, %2, [%0], #8" : "+r"(to) : "r"(first), "r"(second) : "memory");
-}
-/// a + 2^16 b in 32 bits: the compiler makes three instructions of it when a product follows.
-inline std::uint32_t add_shifted(std::uint32_t a, std::uint32_t b) {
-    std::uint32_t result;
-    asm("add %0, %1, %2, lsl #16" : "=r"(result) : "r"(a), "r"(b));
-    return result;
 }
 /// a b + sum in 32 bits. The compiler adds what sums share first, and one instruction becomes two.
 inline std::uint32_t multiply_add(std::uint32_t a, std::uint32_t b, std::uint32_t sum) {

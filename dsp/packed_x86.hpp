@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -158,13 +157,6 @@ inline Quad pack_mixed(Quad low_from, Quad high_from) {
 inline Sum4 dot(Quad a, Quad b, Sum4 sum) {
     return Sum4(_mm_add_epi32(_mm_madd_epi16(a.v, b.v), sum.v));
 }
-/// a + 2^16 b and a 2^up + sum, in 32 bits
-inline Quad add_shifted(Quad a, Quad b) {
-    return Quad(_mm_add_epi32(a.v, _mm_slli_epi32(b.v, 16)));
-}
-inline Quad multiply_add(Quad a, Pair power_of_two, Quad sum) {
-    return Quad(_mm_add_epi32(_mm_sll_epi32(a.v, _mm_cvtsi32_si128(std::countr_zero(power_of_two))), sum.v));
-}
 /// The differences: lane 1 of b, or lane 0 of it, is not -2^15.
 inline Sum4 dot_minus(Quad a, Quad b, Sum4 sum) {
     return dot(a, detail::conjugate(b), sum);
@@ -174,6 +166,36 @@ inline Sum4 dot_cross(Quad a, Quad b, Sum4 sum) {
 }
 inline Sum4 dot_cross_minus(Quad a, Quad b, Sum4 sum) {
     return dot(a, detail::conjugate(swap(b)), sum);
+}
+/// A factor of 32 bits is whole * 2^16 + part, both signed: 16 bits of a product with it are those of two.
+inline Quad scale_lanes(Quad a, std::int32_t factor_0, std::int32_t factor_1) {
+    constexpr int kBoth0 = 0b00'00'00'00;
+    constexpr int kLower = 0b10'00'10'00;
+    constexpr int kUpper = 0b11'01'11'01;
+    const __m128i factors = _mm_unpacklo_epi32(_mm_cvtsi32_si128(factor_0), _mm_cvtsi32_si128(factor_1));
+    const __m128i rounded = _mm_add_epi32(factors, _mm_set1_epi32(1 << 15));
+    const __m128i part = _mm_shuffle_epi32(_mm_shufflelo_epi16(factors, kLower), kBoth0);
+    const __m128i whole = _mm_shuffle_epi32(_mm_shufflelo_epi16(rounded, kUpper), kBoth0);
+    return Quad(_mm_add_epi16(_mm_mullo_epi16(a.v, whole), _mm_mulhi_epi16(a.v, part)));
+}
+inline Quad both_lane0(Quad a, Quad b) {
+    return detail::mix(a, Quad(_mm_slli_epi32(b.v, 16)));
+}
+inline Quad both_lane1(Quad a, Quad b) {
+    return detail::mix(Quad(_mm_srli_epi32(a.v, 16)), b);
+}
+inline Quad mix_low(Sum4 upper_to_low, Quad high_from) {
+    return both_lane1(Quad(upper_to_low.v), high_from);
+}
+inline Quad mix_high(Quad low_from, Sum4 upper_to_high) {
+    return detail::mix(low_from, Quad(upper_to_high.v));
+}
+inline Quad upper_half(Sum4 sum) {
+    return Quad(_mm_srli_epi32(sum.v, 16));
+}
+inline void store_pair(Quad* to, Quad first, Quad second) {
+    to[0] = first;
+    to[1] = second;
 }
 /// The four words to one.
 template <class Combine>

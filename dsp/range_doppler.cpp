@@ -122,23 +122,19 @@ static_assert(kChirps == kFftLength);
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum) {
     const int guard = guard_bits(window);
-    const RangeWindow weights(window);
-    // The Rudin-Shapiro sequence, whose spectrum is flat: no velocity gets more of the bias than others.
-    constexpr std::uint32_t kDither = 0x4748B848;
-    constexpr std::size_t kAtOnce = 2 * kChirpPairs;
-    for (std::size_t first = 0; first < kChirps; first += kAtOnce) {
-        std::array<ChirpPair, kChirpPairs> pairs;
-        for (std::size_t k = first; k < first + kAtOnce; k += 2) {
-            const int exponent = levels.exponent[k / 2] + guard;
-            const packed::Pair dither = kDither >> (k / 2) & 1U;
-            const packed::Pair alternating = k / 2 % 2;
-            pairs[(k - first) / 2] = {frame.chirp[k].data(),
-                                      {levels.sum[k], levels.sum[k + 1]},
-                                      exponent,
-                                      {dither, dither ^ alternating}};
-            spectrum.chirp_exponent[k / 2] = static_cast<std::int16_t>(exponent + kRangeFftExponent);
-        }
-        range_fft_pairs(pairs, weights, &spectrum.row[0][first]);
+    for (std::size_t first = 0; first < kChirps;) {
+        // As many as share an exponent: all of them, as a rule.
+        const std::int16_t deviation = levels.exponent[first / 2];
+        const RangeWindow weights(window, deviation + guard);
+        std::size_t end = first;
+        do {
+            spectrum.chirp_exponent[end / 2] =
+                static_cast<std::int16_t>(weights.exponent() + kRangeFftExponent);
+            end += 2;
+        } while (end < kChirps && levels.exponent[end / 2] == deviation);
+        range_fft(frame.chirp[first].data(), {&levels.sum[first], end - first}, weights,
+                  &spectrum.row[0][first]);
+        first = end;
     }
 }
 

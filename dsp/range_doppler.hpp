@@ -38,8 +38,8 @@ struct PowerMap {
     }
 };
 
-/// DC removal, window and range transform, two chirps at a time; see range_fft. The window is Q15. Deviations
-/// have 12 bits (11 for windows that add up to more than one over half their length), the spectrum 15.
+/// DC removal, window and range transform; see range_fft. The window is Q15. Windowed deviations have 13 bits
+/// (12 for windows that add up to more than one over half their length), the spectrum 15.
 void range_transform(const BeatFrame& frame, const DcLevels& levels, const Window& window,
                      Spectrum& spectrum);
 

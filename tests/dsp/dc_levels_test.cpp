@@ -86,6 +86,22 @@ TEST(DcLevels, ExponentsOfTheLargestAndTheSmallestDeviation) {
     LONGS_EQUAL(-11, levels_of(frame).exponent[2]);
 }
 
+TEST(DcLevels, ExponentsAreSharedFromTheLargestDown) {
+    std::array<std::int16_t, 32> exponent{};
+    exponent.fill(-6);
+    exponent[3] = 4;
+    exponent[4] = 2;
+    exponent[5] = 1;
+    exponent[6] = -1;
+    exponent[7] = -2;
+    exponent[8] = -4;
+    dsp::share_exponent(exponent);
+    for (std::size_t i = 0; i < 32; ++i) {
+        constexpr std::array<int, 6> kExpected{4, 4, 1, 1, -2, -2};
+        LONGS_EQUAL(i >= 3 && i < 9 ? kExpected[i - 3] : -6, exponent[i]);
+    }
+}
+
 TEST(DcLevels, ABurstHasItsOwnScaleAndTheOthersShareOne) {
     fill(200);
     for (auto& s : frame.chirp[21]) s = static_cast<std::int16_t>(100 * s);
@@ -93,7 +109,7 @@ TEST(DcLevels, ABurstHasItsOwnScaleAndTheOthersShareOne) {
     for (auto& s : frame.chirp[41]) s = static_cast<std::int16_t>(s / 2);
     const auto exponent = levels_of(frame).exponent;
     for (std::size_t i = 0; i < 32; ++i)
-        CHECK(i == 10 ? exponent[i] > exponent[0] + 4 : exponent[i] <= exponent[0] + 1);
+        CHECK(i == 10 ? exponent[i] > exponent[0] + 4 : exponent[i] == exponent[0]);
     for (auto& s : frame.chirp[21]) s = static_cast<std::int16_t>(s / 100);
     const auto calm = levels_of(frame).exponent;
     for (const auto e : calm) LONGS_EQUAL(calm[0], e);

@@ -89,7 +89,15 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     LONGS_EQUAL((product(sum, b1) - (product(sum, b1) & 0xFFFF)) / 65536, scale_1(sum, b));
     const auto bits = [](std::int64_t v) { return static_cast<std::uint32_t>(v & 0xFFFFFFFF); };
     UNSIGNED_LONGS_EQUAL(bits(product(a0, b0) + sum), multiply_add(bits(a0), bits(b0), bits(sum)));
-    UNSIGNED_LONGS_EQUAL(bits(a0 + product(65536, b1)), add_shifted(bits(a0), bits(b1)));
+    const std::int64_t scaled0 = (product(sum, a0) - (product(sum, a0) & 0xFFFF)) / 65536;
+    const std::int64_t scaled1 = (product(~sum, a1) - (product(~sum, a1) & 0xFFFF)) / 65536;
+    lanes(wrap16(scaled0), wrap16(scaled1), scale_lanes(a, sum, ~sum));
+    lanes(a0, b0, both_lane0(a, b));
+    lanes(a1, b1, both_lane1(a, b));
+    const std::int64_t upper = wrap16(sum / 65536 - (sum % 65536 < 0 ? 1 : 0));
+    lanes(upper, b1, mix_low(sum, b));
+    lanes(a0, upper, mix_high(a, sum));
+    lanes(upper, 0, upper_half(sum));
     lanes(a0, b1, pack_mixed(a, b));
     lanes(wrap16(sum), wrap16(~sum), pack_low(sum, ~sum));
     lanes(wrap16((product(sum, 2) - (product(sum, 2) & 0xFFFF)) / 65536), wrap16(2 * a1 + (a0 < 0 ? 1 : 0)),

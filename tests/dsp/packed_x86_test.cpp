@@ -83,8 +83,13 @@ TEST(PackedX86, EveryOperationIsItsTwinFourTimes) {
         same(saturated_add_j(qa, qb), [&](std::size_t k) { return saturated_add_j(a[k], b[k]); });
         same(saturated_sub_j(qa, qb), [&](std::size_t k) { return saturated_sub_j(a[k], b[k]); });
         same(pack_mixed(qa, qb), [&](std::size_t k) { return pack_mixed(a[k], b[k]); });
-        same(add_shifted(qa, qb), [&](std::size_t k) { return add_shifted(a[k], b[k]); });
-        same(multiply_add(qa, 8, qb), [&](std::size_t k) { return multiply_add(a[k], 8, b[k]); });
+        same(scale_lanes(qa, sum[0], sum[1]),
+             [&](std::size_t k) { return scale_lanes(a[k], sum[0], sum[1]); });
+        same(both_lane0(qa, qb), [&](std::size_t k) { return both_lane0(a[k], b[k]); });
+        same(both_lane1(qa, qb), [&](std::size_t k) { return both_lane1(a[k], b[k]); });
+        same(mix_low(sums, qb), [&](std::size_t k) { return mix_low(sum[k], b[k]); });
+        same(mix_high(qa, sums), [&](std::size_t k) { return mix_high(a[k], sum[k]); });
+        same(upper_half(sums), [&](std::size_t k) { return upper_half(sum[k]); });
         same(dot(qa, qb, sums), [&](std::size_t k) { return bits(dot(a[k], b[k], sum[k])); });
         same(dot_cross(qa, qb, sums), [&](std::size_t k) { return bits(dot_cross(a[k], b[k], sum[k])); });
         same(dot_minus(qa, qw, sums), [&](std::size_t k) { return bits(dot_minus(a[k], w[k], sum[k])); });
@@ -109,6 +114,13 @@ TEST(PackedX86, RowsAreTransposedAndBack) {
     std::array<Pair, 4 * 6> back{};
     store_transposed(columns.data(), &back[1], 6);
     for (std::size_t i = 0; i < rows.size(); ++i) UNSIGNED_LONGS_EQUAL(i % 6 % 5 == 0 ? 0 : rows[i], back[i]);
+}
+
+TEST(PackedX86, TwoGoToMemory) {
+    const std::array<Four, 2> words_of{Four{1, 2, 3, 4}, Four{5, 6, 7, 8}};
+    std::array<Quad, 2> to;
+    store_pair(to.data(), quad(words_of[0]), quad(words_of[1]));
+    CHECK(words(to[0]) == words_of[0] && words(to[1]) == words_of[1]);
 }
 
 TEST(PackedX86, SamplesComeInOrder) {
