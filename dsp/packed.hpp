@@ -109,9 +109,6 @@ constexpr Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
 constexpr Pair pack_mixed(Pair low_from, Pair high_from) {
     return pack(lane0(low_from), lane1(high_from));
 }
-constexpr Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
-    return pack(lane_0 >> 15, lane_1 >> 15);
-}
 constexpr Pair at_least(Pair a, Pair b) {
     return ((a & 0xFFFFU) >= (b & 0xFFFFU) ? 1U : 0U) | (a >> 16 >= b >> 16 ? 0x10000U : 0U);
 }
@@ -325,12 +322,6 @@ inline Pair pack_high(std::int32_t lane_0, std::int32_t lane_1) {
 inline Pair pack_mixed(Pair low_from, Pair high_from) {
     Pair result;
     asm("pkhbt %0, %1, %2" : "=r"(result) : "r"(low_from), "r"(high_from));
-    return result;
-}
-/// The high halves of two words' doubles.
-inline Pair pack_doubled(std::int32_t lane_0, std::int32_t lane_1) {
-    Pair result;
-    asm("pkhtb %0, %1, %2, asr #15" : "=r"(result) : "r"(static_cast<Pair>(lane_1) << 1), "r"(lane_0));
     return result;
 }
 /// One in each lane where a >= b, both unsigned; else zero.

@@ -148,9 +148,6 @@ inline Quad saturated_sub_j(Quad a, Quad b) {
 inline Quad pack_high(Sum4 lane_0, Sum4 lane_1) {
     return Quad(_mm_or_si128(_mm_srli_epi32(lane_0.v, 16), _mm_and_si128(lane_1.v, detail::upper_lanes())));
 }
-inline Quad pack_doubled(Sum4 lane_0, Sum4 lane_1) {
-    return pack_high(Sum4(_mm_slli_epi32(lane_0.v, 1)), Sum4(_mm_slli_epi32(lane_1.v, 1)));
-}
 inline Quad pack_mixed(Quad low_from, Quad high_from) {
     return detail::mix(low_from, high_from);
 }

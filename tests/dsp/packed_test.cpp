@@ -100,8 +100,6 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     lanes(upper, 0, upper_half(sum));
     lanes(a0, b1, pack_mixed(a, b));
     lanes(wrap16(sum), wrap16(~sum), pack_low(sum, ~sum));
-    lanes(wrap16((product(sum, 2) - (product(sum, 2) & 0xFFFF)) / 65536), wrap16(2 * a1 + (a0 < 0 ? 1 : 0)),
-          pack_doubled(sum, static_cast<std::int32_t>(a)));
     lanes(wrap16(sum / 65536 - (sum % 65536 < 0 ? 1 : 0)), a1, pack_high(sum, static_cast<std::int32_t>(a)));
 }
 }
