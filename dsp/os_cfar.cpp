@@ -313,65 +313,84 @@ bool OsCfar::detects(const PowerMap& map, int range_cell, int doppler_cell) cons
 
 namespace {
 
+constexpr int kUnrolled = 8;  ///< reference cells on a side along Doppler, and along range
+constexpr int kUnrolledRange = 2;
+
 constexpr int kPairsSorted = 10;  ///< of reference cells, as many as the default configuration has
 
 struct Exchange {
-    std::size_t low;
-    std::size_t high;
+    std::uint8_t low;
+    std::uint8_t high;
 };
 
-/// Calls `visit(exchange)` for Batcher's merge exchange (1968) of kPairsSorted numbers.
-template <class Visit>
-constexpr void for_each_exchange(Visit visit) {
-    constexpr std::size_t kSize = kPairsSorted;
-    constexpr std::size_t kTop = std::bit_ceil(kSize) / 2;
-    for (std::size_t p = kTop; p > 0; p /= 2) {
-        std::size_t remainder = 0;
-        std::size_t distance = p;
-        for (std::size_t q = kTop;; q /= 2) {
-            for (std::size_t i = 0; i + distance < kSize; ++i) {
-                if ((i & p) == remainder) visit(Exchange{i, i + distance});
-            }
-            if (q == p) break;
-            distance = q - p;
-            remainder = p;
+/// Sorts kPairsSorted numbers with the fewest exchanges possible (Waksman 1969).
+constexpr std::array<Exchange, 29> kNetwork{{{0, 8}, {1, 9}, {2, 7}, {3, 5}, {4, 6}, {0, 2}, {1, 4}, {5, 8},
+                                             {7, 9}, {0, 3}, {2, 4}, {5, 7}, {6, 9}, {0, 1}, {3, 6}, {8, 9},
+                                             {1, 5}, {2, 3}, {4, 8}, {6, 7}, {1, 2}, {3, 5}, {4, 6}, {7, 8},
+                                             {2, 3}, {4, 5}, {6, 7}, {3, 4}, {5, 6}}};
+/// What sorts zeros and ones sorts everything (Knuth).
+constexpr bool sorts() {
+    for (unsigned numbers = 0; numbers < 1U << kPairsSorted; ++numbers) {
+        unsigned bits = numbers;
+        for (const Exchange& exchange : kNetwork) {
+            const unsigned change = (bits >> exchange.low & ~(bits >> exchange.high)) & 1U;
+            bits ^= change << exchange.low | change << exchange.high;
         }
+        const unsigned zeros = ~bits & ((1U << kPairsSorted) - 1);
+        if ((zeros & (zeros + 1)) != 0) return false;
     }
+    return true;
+}
+static_assert(sorts());
+
+/// Two lists in two lanes, ascending, after a zero.
+using SortedPairs = std::array<packed::Pair, 1 + kPairsSorted>;
+
+/// Every other one of twice kPairsSorted numbers and the rest.
+template <std::size_t... kLane, std::size_t... kIndex>
+SortedPairs sort_in_lanes(const std::uint16_t* numbers, std::index_sequence<kLane...> /*lanes*/,
+                          std::index_sequence<kIndex...> /*exchanges*/) {
+    SortedPairs lanes{0, packed::load(numbers + 2 * kLane)...};
+    (packed::order(lanes[1 + kNetwork[kIndex].low], lanes[1 + kNetwork[kIndex].high]), ...);
+    return lanes;
 }
 
-constexpr std::size_t kExchanges = [] {
-    std::size_t count = 0;
-    for_each_exchange([&count](Exchange) { ++count; });
-    return count;
-}();
+/// Lowers `least`, lane by lane, to the larger of the last of i smallest in one list and the last of j
+/// smallest in the other.
+void lower(packed::Pair& least, packed::Pair i_smallest, packed::Pair j_smallest) {
+    packed::Pair larger = packed::swap(j_smallest);
+    packed::order(i_smallest, larger);
+    packed::order(least, larger);
+}
 
-constexpr auto kNetwork = [] {
-    std::array<Exchange, kExchanges> network{};
-    std::size_t count = 0;
-    for_each_exchange([&](Exchange exchange) { network[count++] = exchange; });
-    return network;
-}();
+// The rank-th smallest in both lists: of i smallest of one and rank - i of the other the larger; the right i
+// gives the least. The rank of the default configuration is known early enough to do without memory.
 
-/// The rank-th smallest of twice kPairsSorted numbers: sorts every other one and the rest at once, in two
-/// lanes, and merges.
-std::uint16_t select_by_sorting(const std::uint16_t* numbers, int rank) {
-    std::array<packed::Pair, kPairsSorted> lanes{};
-    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { lanes[i] = packed::load(numbers + 2 * i); });
-    [&lanes]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
-        (packed::order(lanes[kNetwork[kIndex].low], lanes[kNetwork[kIndex].high]), ...);
-    }
-    (std::make_index_sequence<kExchanges>{});
-    // Of i smallest of one lane and rank - i of the other the larger: the right i gives the least.
-    std::array<packed::Pair, 1 + kPairsSorted> sorted;
-    sorted[0] = 0;
-    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { sorted[1 + i] = lanes[i]; });
+packed::Pair merge(const SortedPairs& sorted, int rank) {
     packed::Pair least = packed::both(0xFFFF);
-    int j = std::min(rank, kPairsSorted);
-    for (int i = rank - j; i <= j; ++i, --j) {
-        packed::Pair low = sorted[static_cast<std::size_t>(i)];
-        packed::Pair high = packed::swap(sorted[static_cast<std::size_t>(j)]);
-        packed::order(low, high);
-        packed::order(least, high);
+    const packed::Pair* last = &sorted[static_cast<std::size_t>(std::min(rank, kPairsSorted))];
+    const packed::Pair* first = &sorted[static_cast<std::size_t>(std::max(rank - kPairsSorted, 0))];
+    for (; first <= last; ++first, --last) lower(least, *first, *last);
+    return least;
+}
+constexpr std::size_t kUsualRank = CfarConfig{}.rank;
+template <std::size_t... kIndex>
+packed::Pair merge_at_usual_rank(const SortedPairs& sorted, std::index_sequence<kIndex...> /*half*/) {
+    packed::Pair least = packed::both(0xFFFF);
+    (lower(least, sorted[kUsualRank - kPairsSorted + kIndex], sorted[kPairsSorted - kIndex]), ...);
+    return least;
+}
+
+/// The rank-th smallest of twice kPairsSorted numbers.
+std::uint16_t select_by_sorting(const std::uint16_t* numbers, int rank) {
+    const SortedPairs sorted = sort_in_lanes(numbers, std::make_index_sequence<kPairsSorted>{},
+                                             std::make_index_sequence<kNetwork.size()>{});
+    packed::Pair least = 0;
+    if (rank == kUsualRank) {
+        least = merge_at_usual_rank(sorted, std::make_index_sequence<kPairsSorted - kUsualRank / 2 + 1>{});
+    } else {
+        const SortedPairs in_memory = sorted;
+        least = merge(in_memory, rank);
     }
     return static_cast<std::uint16_t>(std::min(least & 0xFFFFU, least >> 16));
 }
@@ -391,18 +410,58 @@ std::uint16_t select_by_counting(std::span<const std::uint16_t> numbers, int ran
     return static_cast<std::uint16_t>(selected);
 }
 
+/// Copies the reference cells along Doppler of any number and spacing. Returns the end of the copy.
+[[gnu::noinline]] std::uint16_t* copy_doppler_references(const PowerMap& map, const CfarConfig& config, int r,
+                                                         int d, std::uint16_t* end) {
+    for_each_doppler_reference(map, config, r, d, [&end](std::uint16_t right, std::uint16_t left) {
+        packed::store(end, packed::pack_low(right, left));
+        end += 2;
+    });
+    return end;
+}
+/// Those along range at the ends of the map.
+[[gnu::noinline]] std::uint16_t* copy_range_references(const PowerMap& map, const CfarConfig& config, int r,
+                                                       int d, std::uint16_t* end) {
+    for_each_range_reference(map, config, r, d,
+                             [&end](const std::uint16_t* reference) { *end++ = *reference; });
+    return end;
+}
+
 }  // namespace
 
 std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell) const {
     alignas(4) std::array<std::uint16_t, kMaxReferenceCells> cells;
     std::uint16_t* end = cells.data();
-    for_each_doppler_reference(map, config_, range_cell, doppler_cell,
-                               [&end](std::uint16_t right, std::uint16_t left) {
-                                   packed::store(end, packed::pack_low(right, left));
-                                   end += 2;
-                               });
-    for_each_range_reference(map, config_, range_cell, doppler_cell,
-                             [&end](const std::uint16_t* cell) { *end++ = *cell; });
+    const std::uint16_t* row = map.cell[static_cast<std::size_t>(range_cell)].data();
+    if (config_.doppler_reference == kUnrolled && config_.spacing == 2) {
+        const auto nearest = static_cast<std::size_t>(config_.doppler_guard) + 1;
+        const std::size_t right = static_cast<std::size_t>(doppler_cell) + nearest;
+        const std::size_t left = static_cast<std::size_t>(doppler_cell) - nearest;
+        const auto pair = [=](std::size_t i) {
+            return packed::pack_low(row[(right + i) & kDopplerMask], row[(left - i) & kDopplerMask]);
+        };
+        [=]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
+            (packed::store_pair(end + 4 * kIndex, pair(4 * kIndex), pair(4 * kIndex + 2)), ...);
+        }
+        (std::make_index_sequence<kUnrolled / 2>{});
+        end += 2 * kUnrolled;
+    } else {
+        end = copy_doppler_references(map, config_, range_cell, doppler_cell, end);
+    }
+    const std::uint16_t* cell = row + doppler_cell;
+    const int farthest_range = config_.range_guard + 1 + config_.spacing * (config_.range_reference - 1);
+    if (range_cell - farthest_range >= config_.first_range_cell &&
+        range_cell + farthest_range < kRangeCells) {
+        std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config_.range_guard + 1);
+        const std::ptrdiff_t step = std::ptrdiff_t{kDopplerCells} * config_.spacing;
+        for (int i = config_.range_reference; i > 0; --i) {
+            packed::store(end, packed::pack_low(cell[rows], cell[-rows]));
+            end += 2;
+            rows += step;
+        }
+    } else {
+        end = copy_range_references(map, config_, range_cell, doppler_cell, end);
+    }
     std::int32_t selected = 0;
     if (end - cells.data() <= 2 * kPairsSorted) {
         std::fill(end, cells.data() + 2 * kPairsSorted, std::uint16_t{0xFFFF});
@@ -443,9 +502,6 @@ std::uint64_t in_order(const RowBits& bits) {
     const std::uint32_t high = spread(even >> 16) | spread(odd >> 16) << 1;
     return low | std::uint64_t{high} << 32;
 }
-
-constexpr int kUnrolled = 8;  ///< reference cells on a side along Doppler, and along range
-constexpr int kUnrolledRange = 2;
 
 /// What the cells under test of a row have in common.
 struct RowTest {
