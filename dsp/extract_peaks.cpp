@@ -9,6 +9,7 @@
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
+#include "dsp/unrolled.hpp"
 #include "dsp/window_response.hpp"
 
 namespace dsp {
@@ -89,192 +90,72 @@ void sort(std::span<Candidate> list) {
     return count;
 }
 
-/// Five neighbouring cells along an axis, and a zero.
-using Taps = std::array<std::int16_t, kTaps + 1>;
+/// Where the five by five cells around a peak are: a row's in order, the next row `stride` cells further.
+struct Patch {
+    const Complex16* cell;
+    std::size_t stride;
+    const std::int16_t* exponent;  ///< of the rows
+};
 
-/// sum_i w_i s_i, Q12 times the cells' unit.
-std::int32_t weigh(const Taps& cells, const WindowResponse::Weights& weights) {
-    static_assert(kTaps == 5);
-    std::int32_t sum = packed::dot(packed::load(&cells[0]), packed::load(&weights[0]), 0);
-    sum = packed::dot(packed::load(&cells[2]), packed::load(&weights[2]), sum);
-    return packed::dot(packed::load(&cells[4]), packed::load(&weights[4]), sum);
+/// A target's offset along an axis, roughly: towards higher cells unless mirrored.
+struct Guess {
+    int grid;  ///< steps of WindowResponse
+    bool mirrored;
+};
+
+/// By the power of the peak over that of a neighbour: the offset towards it, grid steps, also negative.
+int offset_towards(const WindowResponse& response, std::int32_t ratio) {
+    const auto i = std::min<std::int32_t>(ratio >> WindowResponse::kRatioBits, WindowResponse::kRatios - 1);
+    return response.offset_by_ratio[static_cast<std::size_t>(i)];
 }
 
-/// Both sums of a lobe.
-struct Estimate {
+/// Towards the larger neighbour.
+Guess guess(const WindowResponse& response, std::int32_t power, std::int32_t below, std::int32_t above) {
+    return {std::max(offset_towards(response, power - std::max(below, above)), 0), below > above};
+}
+
+/// Sums over a row of cells with a guess's weights for Doppler: of amplitudes and of offsets.
+struct RowSums {
     std::int32_t amplitude;
     std::int32_t offset;
 };
-Estimate weigh(const Taps& cells, const WindowResponse::Lobe& lobe) {
-    static_assert(sizeof lobe == 6 * sizeof(packed::Pair));
-    packed::Pair a0 = 0;
-    packed::Pair a2 = 0;
-    packed::Pair a4 = 0;
-    packed::Pair g0 = 0;
-    packed::Pair g2 = 0;
-    packed::Pair g4 = 0;
-    packed::load_pair(&lobe.amplitude[0], a0, a2);
-    packed::load_pair(&lobe.amplitude[4], a4, g0);
-    packed::load_pair(&lobe.offset[2], g2, g4);
-    const packed::Pair s0 = packed::load(&cells[0]);
-    const packed::Pair s2 = packed::load(&cells[2]);
-    const packed::Pair s4 = packed::load(&cells[4]);
-    return {packed::dot(s4, a4, packed::dot(s2, a2, packed::dot(s0, a0, 0))),
-            packed::dot(s4, g4, packed::dot(s2, g2, packed::dot(s0, g0, 0)))};
+
+/// v 2^up, clamped to +-2^28; `up` at least 0.
+std::int32_t scaled_up(std::int32_t v, int up) {
+    if (up > 28) up = 28;
+    const std::int32_t most = (1 << 28) >> up;
+    return std::clamp(v, -most, most) * (1 << up);
 }
 
-/// The cells around a peak with the peak's phase and the lobe's alternating sign taken off: a lone target is
-/// real and positive there, the peak cell at least 2^13 and below 2^14, rounded down to one. What is more
-/// than twice that saturates; it is another target's. Mirrored along an axis where the target lies on the
-/// lower side of the peak cell, so that offsets are positive.
-struct Patch {
-    static constexpr int kUnitBits = 14;
-    alignas(4) std::array<Taps, kTaps> along_doppler;  ///< [range cell]
-    alignas(4) Taps along_range;                       ///< through the peak cell
-    std::int32_t log2_unit;                            ///< of the peak cell, Q6.10
-};
-
-using Columns = std::array<std::size_t, kTaps>;
-
-/// Five cells of a row: the real parts of those with even and with odd index times the conjugates of two
-/// rotations, over 2^down, to `taps`.
-inline void align_row(const Complex16* cells, const Columns& columns, packed::Pair even, packed::Pair odd,
-                      int down, Taps& taps) {
-    static_assert(kTaps == 5);
-    const auto aligned = [&](std::size_t j, packed::Pair rotation) {
-        return saturate16(packed::dot(packed::load(&cells[columns[j]].re), rotation, 0) >> down);
-    };
-    packed::store(&taps[0], packed::pack_low(aligned(0, even), aligned(1, odd)));
-    packed::store(&taps[2], packed::pack_low(aligned(2, even), aligned(3, odd)));
-    packed::store(&taps[4], packed::pack_low(aligned(4, even), 0));
-}
-
-/// The same for a row below cell 0, above the last one, or with another, far stronger target: down < 0.
-[[gnu::noinline]] void align_other_row(const Spectrum& spectrum, int range, Columns columns,
-                                       packed::Pair even, packed::Pair odd, int down, Taps& taps) {
-    taps = {};
-    if (range >= kRangeCells) return;  // not kept
-    if (range < 0) {                   // a real signal's spectrum: X[-r, -d] = conj X[r, d]
-        for (std::size_t& column : columns) column = (kDopplerCells - column) & (kDopplerCells - 1);
-        even = packed::pack(packed::lane0(even), -packed::lane1(even));
-        odd = packed::pack(packed::lane0(odd), -packed::lane1(odd));
-    }
-    align_row(spectrum.row[static_cast<std::size_t>(std::abs(range))].data(), columns, even, odd,
-              std::clamp(down, 0, 31), taps);
-    const int up = std::clamp(-down, 0, 15);
-    for (std::int16_t& tap : taps) tap = static_cast<std::int16_t>(saturate16(tap * (1 << up)));
-}
-
-Patch align(const Spectrum& spectrum, const Cell& peak, bool mirror_range, bool mirror_doppler) {
-    const auto peak_row = static_cast<std::size_t>(peak.range);
-    const Complex16 top = spectrum.row[peak_row][static_cast<std::size_t>(peak.doppler)];
-    // One step less at the very end of the format, so that no sum of two products overflows.
-    const auto inside = [](std::int16_t v) { return std::max<std::int32_t>(v, -32767); };
-    const std::int32_t re = inside(top.re);
-    const std::int32_t im = inside(top.im);
-    const auto power = static_cast<std::uint32_t>(re * re + im * im);
-    const int down = static_cast<int>(std::bit_width(power)) - Patch::kUnitBits;
-    Patch patch;
-    patch.log2_unit = log2_q10(power) - down * kLogOne;
-    patch.along_range[kTaps] = 0;
-    const int range_step = mirror_range ? -1 : 1;
-    const int doppler_step = mirror_doppler ? -1 : 1;
-    const int exponent = down + spectrum.row_exponent[peak_row];
-    const auto column = [&peak, doppler_step](int j) {
-        return static_cast<std::size_t>(peak.doppler + j * doppler_step) & (kDopplerCells - 1);
-    };
-    const Columns columns{column(-2), column(-1), column(0), column(1), column(2)};
-    // Cells of even and of odd distance to the peak have opposite signs.
-    packed::Pair even = packed::pack(re, im);
-    packed::Pair odd = packed::pack(-re, -im);
-    int range = peak.range - range_step * kReach;
-    for (std::size_t i = 0; i < kTaps; ++i, range += range_step) {
-        Taps& taps = patch.along_doppler[i];
-        const auto row = static_cast<std::size_t>(std::min(std::abs(range), kRangeCells - 1));
-        const int row_down = exponent - spectrum.row_exponent[row];
-        if (static_cast<unsigned>(range) < kRangeCells && row_down >= 0) {
-            align_row(spectrum.row[row].data(), columns, even, odd, std::min(row_down, 31), taps);
-        } else {
-            align_other_row(spectrum, range, columns, even, odd, row_down, taps);
-        }
-        patch.along_range[i] = taps[kReach];
-        std::swap(even, odd);
-    }
-    return patch;
-}
-
-/// A WindowResponse's weights for a guess of the offset.
-class Guess {
-  public:
-    Guess(const WindowResponse& response, std::int32_t offset_q15)
-        : response_(response),
-          index_(std::clamp<std::int32_t>(
-              (offset_q15 + kStepQ15 / 2) >> (15 - std::countr_zero(unsigned{WindowResponse::kGridPerCell})),
-              0, WindowResponse::kGrid - 1)) {}
-
-    [[nodiscard]] std::int32_t amplitude(const Taps& taps) const { return weigh(taps, lobe().amplitude); }
-    /// Guess plus sum g s / A, the quotient within 2^-15, at most kFarthestQ15 either way.
-    [[nodiscard]] std::int32_t refined_q15(const Estimate& estimate) const {
-        const std::int32_t amplitude = estimate.amplitude;
-        if (amplitude <= 0) return 0;
-        std::int32_t step = 1 << 15;
-        if (estimate.offset <= -amplitude) {
-            step = -step;
-        } else if (estimate.offset < amplitude) {
-            const int up = std::countl_zero(static_cast<std::uint32_t>(amplitude)) - 1;
-            step = (estimate.offset * (1 << up)) / (amplitude * (1 << up) >> 15);
-        }
-        return std::clamp(index_ * kStepQ15 + step, -kFarthestQ15, kFarthestQ15);
-    }
-    [[nodiscard]] Estimate estimate(const Taps& taps) const { return weigh(taps, lobe()); }
-    [[nodiscard]] std::int32_t refined_q15(const Taps& taps) const { return refined_q15(estimate(taps)); }
-    /// The amplitudes of five lines of cells.
-    [[nodiscard]] Taps profile_of_lines(const std::array<Taps, kTaps>& lines) const {
-        return rounded({amplitude(lines[0]), amplitude(lines[1]), amplitude(lines[2]), amplitude(lines[3]),
-                        amplitude(lines[4])});
-    }
-    /// The amplitudes across them.
-    [[nodiscard]] Taps profile_across(const std::array<Taps, kTaps>& lines) const {
-        std::array<std::int32_t, kTaps> sum{};
-        const auto add = [&](std::size_t i, auto multiply_low, auto multiply_high) {
-            const packed::Pair weight = packed::load(&lobe().amplitude[i & ~std::size_t{1}]);
-            const packed::Pair first = packed::load(&lines[i][0]);
-            const packed::Pair second = packed::load(&lines[i][2]);
-            sum[0] = multiply_low(first, weight, sum[0]);
-            sum[1] = multiply_high(first, weight, sum[1]);
-            sum[2] = multiply_low(second, weight, sum[2]);
-            sum[3] = multiply_high(second, weight, sum[3]);
-            sum[4] = multiply_low(packed::load(&lines[i][4]), weight, sum[4]);
+/// `rotation`: takes the phase off the cells, so that a lone target is real and positive in the peak cell.
+/// The sums are in the unit of a row with exponent `exponent`, times |rotation| / 16.
+void sum_rows(const Patch& patch, int exponent, packed::Pair rotation,
+              const std::array<packed::Pair, kTaps>& weight, std::array<RowSums, kTaps>& sums) {
+    const Complex16* cells = patch.cell;
+    const std::int16_t* row_exponent = patch.exponent;
+    for (RowSums& row : sums) {
+        const auto aligned = [cells, rotation](std::size_t j) {
+            return packed::dot(packed::load(&cells[j].re), rotation);
         };
-        add(0, packed::multiply_00, packed::multiply_10);
-        add(1, packed::multiply_01, packed::multiply_11);
-        add(2, packed::multiply_00, packed::multiply_10);
-        add(3, packed::multiply_01, packed::multiply_11);
-        add(4, packed::multiply_00, packed::multiply_10);
-        return rounded(sum);
+        const std::int32_t first = aligned(0);
+        std::int32_t amplitude = packed::scale_0(first, weight[0]);
+        std::int32_t offset = packed::scale_1(first, weight[0]);
+        unrolled<kTaps - 1, 1, kTaps - 1>([&](std::size_t i) {
+            const std::int32_t cell = aligned(i + 1);
+            amplitude = packed::scale_add_0(cell, weight[i + 1], amplitude);
+            offset = packed::scale_add_1(cell, weight[i + 1], offset);
+        });
+        const int down = exponent - *row_exponent++;
+        if (down >= 0) {
+            row.amplitude = amplitude >> std::min(down, 31);
+            row.offset = offset >> std::min(down, 31);
+        } else {  // another, far stronger target's
+            row.amplitude = scaled_up(amplitude, -down);
+            row.offset = scaled_up(offset, -down);
+        }
+        cells += patch.stride;
     }
-    /// log2 of the variances in WindowResponse.
-    [[nodiscard]] std::int32_t amplitude_variance() const { return response_.amplitude_variance[index()]; }
-    [[nodiscard]] std::int32_t offset_variance() const { return response_.offset_variance[index()]; }
-
-  private:
-    static constexpr std::int32_t kStepQ15 = (1 << 15) / WindowResponse::kGridPerCell;
-    /// A peak of one target lies within half a cell of the largest cell; noise moves it a little further.
-    static constexpr std::int32_t kFarthestQ15 = (3 << 15) / 4;
-    [[nodiscard]] const WindowResponse::Lobe& lobe() const { return response_.lobe[index()]; }
-    [[nodiscard]] std::size_t index() const { return static_cast<std::size_t>(index_); }
-    static Taps rounded(const std::array<std::int32_t, kTaps>& sum) {
-        constexpr int kBits = WindowResponse::kWeightBits;
-        const auto tap = [&sum](std::size_t i) { return saturate16<kBits>(sum[i] + (1 << (kBits - 1))); };
-        Taps taps;
-        packed::store(&taps[0], packed::pack_low(tap(0), tap(1)));
-        packed::store(&taps[2], packed::pack_low(tap(2), tap(3)));
-        packed::store(&taps[4], packed::pack_low(tap(4), 0));
-        return taps;
-    }
-    const WindowResponse& response_;
-    std::int32_t index_;
-};
+}
 
 /// Which maxima are no targets but sidelobes of others. Remembers the targets by range cell: away from a
 /// target's rows its sidelobes are so weak that most pairs need no look.
@@ -355,59 +236,141 @@ struct Place {
     std::int32_t doppler_variance = 0;
 };
 
-/// The offset at which the cell below the peak has this much of its power, log2 Q6.10.
-std::int32_t offset_from_below(const WindowResponse& response, std::int32_t ratio) {
-    constexpr std::int32_t kStepQ15 = (1 << 15) / WindowResponse::kGridPerCell;
-    std::size_t i = 0;  // the ratio falls along the table, for a rectangular window up to offset 0
-    while (i + 1 < response.below.size() && response.below[i + 1] > ratio &&
-           response.below[i + 1] < response.below[i]) {
-        ++i;
-    }
-    return (static_cast<std::int32_t>(i) - WindowResponse::kGridPerCell / 2) * kStepQ15;
-}
-
-[[gnu::noinline]] Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
-                               const WindowResponse& range_response, const WindowResponse& doppler_response) {
-    const bool has_range_above = peak.range + kReach < kRangeCells;
-    Place place;
-    bool mirror_range = false;
-    if (has_range_above) {
-        mirror_range =
-            peak.range > 0 && map.at(peak.range - 1, peak.doppler) > map.at(peak.range + 1, peak.doppler);
-    } else {
-        const std::int32_t below = map.at(peak.range - 1, peak.doppler);
-        place.range_q15 = offset_from_below(range_response, below - peak.power);
-        mirror_range = place.range_q15 < 0;
-        if (mirror_range) place.range_q15 = -place.range_q15;
-    }
-    const bool mirror_doppler = map.at(peak.range, peak.doppler - 1) > map.at(peak.range, peak.doppler + 1);
-    const Patch patch = align(spectrum, peak, mirror_range, mirror_doppler);
-    // Each round's error is the square of the one before; the grid limits it to 1/32 cell from the second on.
-    // The first rounds only choose the weights of the last one: the axes through the peak suffice.
-    for (int round = 0; round < 2; ++round) {
-        place.doppler_q15 =
-            Guess(doppler_response, place.doppler_q15).refined_q15(patch.along_doppler[kReach]);
-        if (has_range_above) {
-            place.range_q15 = Guess(range_response, place.range_q15).refined_q15(patch.along_range);
+/// Offsets from a lobe's sums: guess plus sum g s / A, the quotient within 2^-15, at most kFarthestQ15 either
+/// way.
+class Refinement {
+  public:
+    explicit Refinement(std::int32_t amplitude)
+        : amplitude_(amplitude),
+          up_(std::countl_zero(static_cast<std::uint32_t>(amplitude)) - 1),
+          divisor_(amplitude * (1 << up_) >> 15) {}
+    /// `amplitude` was positive.
+    [[nodiscard]] std::int32_t offset_q15(const Guess& guess, std::int32_t sum) const {
+        std::int32_t step = 1 << 15;
+        if (sum <= -amplitude_) {
+            step = -step;
+        } else if (sum < amplitude_) {
+            step = sum * (1 << up_) / divisor_;
         }
+        constexpr std::int32_t kStepQ15 = (1 << 15) / WindowResponse::kGridPerCell;
+        /// A peak of one target lies within half a cell of the largest cell; noise moves it a little further.
+        constexpr std::int32_t kFarthestQ15 = (3 << 15) / 4;
+        const std::int32_t offset = std::clamp(guess.grid * kStepQ15 + step, -kFarthestQ15, kFarthestQ15);
+        return guess.mirrored ? -offset : offset;
     }
-    const Guess range(range_response, place.range_q15);
-    const Guess doppler(doppler_response, place.doppler_q15);
-    const Estimate estimate = doppler.estimate(range.profile_across(patch.along_doppler));
-    place.doppler_q15 = doppler.refined_q15(estimate);
-    if (has_range_above) place.range_q15 = range.refined_q15(doppler.profile_of_lines(patch.along_doppler));
-    if (mirror_range) place.range_q15 = -place.range_q15;
-    if (mirror_doppler) place.doppler_q15 = -place.doppler_q15;
-    // Noise adds (g'Cg)(a'Ca) / 2A^2 to the offset, A the lobe's amplitude and not that of the peak cell.
-    const std::int32_t amplitude =
-        log2_q10(static_cast<std::uint32_t>(std::max(estimate.amplitude, std::int32_t{1}))) -
-        WindowResponse::kWeightBits * kLogOne;
-    const std::int32_t lobe =
-        2 * (patch.log2_unit - amplitude) - (2 * WindowResponse::kWeightBits + 1) * kLogOne;
-    place.range_variance = lobe + range.offset_variance() + doppler.amplitude_variance();
-    place.doppler_variance = lobe + doppler.offset_variance() + range.amplitude_variance();
+
+  private:
+    std::int32_t amplitude_;
+    int up_;
+    std::int32_t divisor_;
+};
+
+/// Both responses: of the windows along range and along Doppler.
+struct Responses {
+    const WindowResponse& range;
+    const WindowResponse& doppler;
+};
+
+[[gnu::noinline]] Place locate(const Patch& patch, const PowerMap& map, const Cell& peak,
+                               const Responses& response) {
+    const bool has_range_above = peak.range + kReach < kRangeCells;
+    const std::int32_t below =
+        peak.range > 0 ? map.at(peak.range - 1, peak.doppler) : map.at(1, -peak.doppler);
+    Guess range{};
+    if (has_range_above) {
+        range = guess(response.range, peak.power, below, map.at(peak.range + 1, peak.doppler));
+    } else {
+        const int offset = -offset_towards(response.range, peak.power - below);
+        range = {std::abs(offset), offset < 0};
+    }
+    const Guess doppler = guess(response.doppler, peak.power, map.at(peak.range, peak.doppler - 1),
+                                map.at(peak.range, peak.doppler + 1));
+
+    const packed::Pair top = packed::load(&patch.cell[kReach * patch.stride + kReach].re);
+    const int exponent = patch.exponent[kReach];
+    // With 14 bits, so that no sum of two products overflows.
+    const int bits = packed::magnitude_bits(packed::spread(top));
+    const packed::Pair rotation =
+        packed::pack_low(packed::lane0(top) * (1 << 14) >> bits, packed::lane1(top) * (1 << 14) >> bits);
+
+    const auto weights = [](const WindowResponse& of, const Guess& guess) {
+        return &of.weight[static_cast<std::size_t>(guess.grid)][guess.mirrored ? kTaps - 1 : 0];
+    };
+    const auto next = [](const Guess& guess) { return guess.mirrored ? -1 : 1; };
+    std::array<packed::Pair, kTaps> weight;
+    const WindowResponse::Weight* w = weights(response.doppler, doppler);
+    unrolled<kTaps, 1, kTaps>([&](std::size_t j) {
+        weight[j] = packed::load(&w->amplitude);
+        w += next(doppler);
+    });
+    std::array<RowSums, kTaps> rows;
+    sum_rows(patch, exponent, rotation, weight, rows);
+
+    std::int32_t amplitude = 0;
+    std::int32_t range_sum = 0;
+    std::int32_t doppler_sum = 0;
+    w = weights(response.range, range);
+    unrolled<kTaps, 1, kTaps>([&](std::size_t i) {
+        const packed::Pair pair = packed::load(&w->amplitude);
+        amplitude = packed::scale_add_0(rows[i].amplitude, pair, amplitude);
+        range_sum = packed::scale_add_1(rows[i].amplitude, pair, range_sum);
+        doppler_sum = packed::scale_add_0(rows[i].offset, pair, doppler_sum);
+        w += next(range);
+    });
+    Place place;
+    if (amplitude > 0) {
+        const Refinement refinement(amplitude);
+        place.range_q15 = refinement.offset_q15(range, has_range_above ? range_sum : 0);
+        place.doppler_q15 = refinement.offset_q15(doppler, doppler_sum);
+    }
+    // Noise adds (g'Cg)(a'Ca) / 2A^2 to the offset, A the lobe's amplitude and not that of the peak cell:
+    // `amplitude` is A |rotation| / 2^8.
+    const std::int32_t log2_amplitude =
+        log2_q10(static_cast<std::uint32_t>(std::max(amplitude, std::int32_t{1})));
+    const std::int32_t lobe = 2 * (peak.power - log2_amplitude + (14 - 8 - bits - 2 * exponent) * kLogOne) -
+                              (2 * WindowResponse::kWeightBits + 1) * kLogOne;
+    const auto range_grid = static_cast<std::size_t>(range.grid);
+    const auto doppler_grid = static_cast<std::size_t>(doppler.grid);
+    place.range_variance =
+        lobe + response.range.offset_variance[range_grid] + response.doppler.amplitude_variance[doppler_grid];
+    place.doppler_variance =
+        lobe + response.doppler.offset_variance[doppler_grid] + response.range.amplitude_variance[range_grid];
     if (!has_range_above) place.range_variance += 3 * kLogOne;  // one cell of the four, and a table's step
     return place;
+}
+
+/// Where the cells around the peak are not one rectangle in memory: Doppler is cyclic, rows below cell 0 are
+/// the other half of a real signal's spectrum, X[-r, -d] = conj X[r, d], and those above the last one are not
+/// kept: zero.
+[[gnu::noinline]] Place locate_in_copy(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
+                                       const Responses& response) {
+    std::array<std::array<Complex16, kTaps>, kTaps> cells;
+    std::array<std::int16_t, kTaps> exponents;
+    for (int i = -kReach; i <= kReach; ++i) {
+        const int range = peak.range + i;
+        const auto row = static_cast<std::size_t>(std::min(std::abs(range), kRangeCells - 1));
+        const auto to = static_cast<std::size_t>(i + kReach);
+        exponents[to] = spectrum.row_exponent[row];
+        for (int j = -kReach; j <= kReach; ++j) {
+            const int doppler = range < 0 ? -(peak.doppler + j) : peak.doppler + j;
+            Complex16 cell = spectrum.row[row][static_cast<std::size_t>(doppler) & (kDopplerCells - 1)];
+            if (range < 0) cell.im = static_cast<std::int16_t>(saturate16(-cell.im));
+            if (range >= kRangeCells) cell = {};
+            cells[to][static_cast<std::size_t>(j + kReach)] = cell;
+        }
+    }
+    return locate({&cells[0][0], kTaps, exponents.data()}, map, peak, response);
+}
+
+Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak, const Responses& response) {
+    if (static_cast<unsigned>(peak.range - kReach) >= kRangeCells - 2 * kReach ||
+        static_cast<unsigned>(peak.doppler - kReach) >= kDopplerCells - 2 * kReach) {
+        return locate_in_copy(spectrum, map, peak, response);
+    }
+    const auto row = static_cast<std::size_t>(peak.range - kReach);
+    return locate({&spectrum.row[row][static_cast<std::size_t>(peak.doppler - kReach)], kDopplerCells,
+                   &spectrum.row_exponent[row]},
+                  map, peak, response);
 }
 
 /// Variance from noise, cells^2.
@@ -451,7 +414,7 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
             ++detections.dropped;
             continue;
         }
-        const Place place = locate(spectrum, map, peak, range_response, doppler_response);
+        const Place place = locate(spectrum, map, peak, {range_response, doppler_response});
         // Doppler cells 32..63 are closing; between cell 31 and 32 the position wraps from 32 to -32.
         std::int32_t doppler_q15 = peak.doppler * (1 << 15) + place.doppler_q15;
         if (doppler_q15 >= kDopplerCells / 2 * (1 << 15)) doppler_q15 -= kDopplerCells * (1 << 15);
