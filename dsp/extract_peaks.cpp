@@ -5,16 +5,26 @@
 #include <cstddef>
 #include <cstdlib>
 #include <span>
+#include <utility>
 
+#include "dsp/fixed_math.hpp"
 #include "dsp/fixed_point.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
-#include "dsp/unrolled.hpp"
 #include "dsp/window_response.hpp"
 
 namespace dsp {
 
 namespace {
+
+/// body(0) .. body(kTimes - 1), written out.
+template <std::size_t kTimes, class Body>
+void for_each_index(Body body) {
+    [&body]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
+        (body(kIndex), ...);
+    }
+    (std::make_index_sequence<kTimes>{});
+}
 
 constexpr int kReach = WindowResponse::kReach;
 constexpr int kTaps = WindowResponse::kTaps;
@@ -90,13 +100,6 @@ void sort(std::span<Candidate> list) {
     return count;
 }
 
-/// Where the five by five cells around a peak are: a row's in order, the next row `stride` cells further.
-struct Patch {
-    const Complex16* cell;
-    std::size_t stride;
-    const std::int16_t* exponent;  ///< of the rows
-};
-
 /// A target's offset along an axis, roughly: towards higher cells unless mirrored.
 struct Guess {
     int grid;  ///< steps of WindowResponse
@@ -121,88 +124,102 @@ struct RowSums {
 };
 
 /// v 2^up, clamped to +-2^28; `up` at least 0.
-std::int32_t scaled_up(std::int32_t v, int up) {
+[[gnu::noinline]] std::int32_t scaled_up(std::int32_t v, int up) {
     if (up > 28) up = 28;
     const std::int32_t most = (1 << 28) >> up;
     return std::clamp(v, -most, most) * (1 << up);
 }
 
-/// `rotation`: takes the phase off the cells, so that a lone target is real and positive in the peak cell.
-/// The sums are in the unit of a row with exponent `exponent`, times |rotation| / 16.
-void sum_rows(const Patch& patch, int exponent, packed::Pair rotation,
-              const std::array<packed::Pair, kTaps>& weight, std::array<RowSums, kTaps>& sums) {
-    const Complex16* cells = patch.cell;
-    const std::int16_t* row_exponent = patch.exponent;
-    for (RowSums& row : sums) {
-        const auto aligned = [cells, rotation](std::size_t j) {
-            return packed::dot(packed::load(&cells[j].re), rotation);
-        };
-        const std::int32_t first = aligned(0);
-        std::int32_t amplitude = packed::scale_0(first, weight[0]);
-        std::int32_t offset = packed::scale_1(first, weight[0]);
-        unrolled<kTaps - 1, 1, kTaps - 1>([&](std::size_t i) {
-            const std::int32_t cell = aligned(i + 1);
-            amplitude = packed::scale_add_0(cell, weight[i + 1], amplitude);
-            offset = packed::scale_add_1(cell, weight[i + 1], offset);
-        });
-        const int down = exponent - *row_exponent++;
-        if (down >= 0) {
-            row.amplitude = amplitude >> std::min(down, 31);
-            row.offset = offset >> std::min(down, 31);
-        } else {  // another, far stronger target's
-            row.amplitude = scaled_up(amplitude, -down);
-            row.offset = scaled_up(offset, -down);
-        }
-        cells += patch.stride;
-    }
+/// What the rows around a peak have in common.
+struct Alignment {
+    /// Takes the phase off the cells, so that a lone target is real and positive in the peak cell.
+    packed::Pair rotation;
+    std::array<packed::Pair, kTaps> weight;  ///< along Doppler
+    int exponent;                            ///< of the peak's row
+};
+
+/// In the unit of the peak's row, times |rotation| / 16. `exponent`: of this row, at most 31 away.
+[[gnu::always_inline]] inline RowSums sum_row(const Complex16* cells, int exponent,
+                                              const Alignment& alignment) {
+    RowSums sums{0, 0};
+    for_each_index<kTaps>([&](std::size_t j) {
+        const std::int32_t aligned = packed::dot(packed::load(&cells[j].re), alignment.rotation);
+        sums.amplitude = packed::scale_add_0(aligned, alignment.weight[j], sums.amplitude);
+        sums.offset = packed::scale_add_1(aligned, alignment.weight[j], sums.offset);
+    });
+    const int down = alignment.exponent - exponent;
+    if (down >= 0) return {sums.amplitude >> down, sums.offset >> down};
+    // Another, far stronger target's row.
+    return {scaled_up(sums.amplitude, -down), scaled_up(sums.offset, -down)};
 }
+
+using PatchSums = std::array<RowSums, kTaps>;
+
+/// Of rows that are not all there or not in one piece: Doppler is cyclic, those below cell 0 are the other
+/// half of a real signal's spectrum, X[-r, -d] = conj X[r, d], and those above the last one are not kept:
+/// zero.
+[[gnu::noinline]] PatchSums sum_copied_rows(const Spectrum& spectrum, const Cell& peak,
+                                            const Alignment& alignment) {
+    PatchSums sums;
+    int range = peak.range - kReach;
+    for (RowSums& row_sums : sums) {
+        row_sums = {};
+        if (range < kRangeCells) {
+            const auto row = static_cast<std::size_t>(std::abs(range));
+            const int first = (range < 0 ? -peak.doppler : peak.doppler) - kReach;
+            std::array<Complex16, kTaps> cells;
+            for (std::size_t j = 0; j < kTaps; ++j) {
+                cells[j] = spectrum.row[row][(static_cast<std::size_t>(first) + j) & (kDopplerCells - 1)];
+            }
+            if (range < 0) {
+                std::ranges::reverse(cells);
+                for (Complex16& x : cells) x.im = static_cast<std::int16_t>(saturate16(-x.im));
+            }
+            row_sums = sum_row(cells.data(), spectrum.row_exponent[row], alignment);
+        }
+        ++range;
+    }
+    return sums;
+}
+
+/// Both responses: of the windows along range and along Doppler.
+struct Responses {
+    const WindowResponse& range;
+    const WindowResponse& doppler;
+};
 
 /// Which maxima are no targets but sidelobes of others. Remembers the targets by range cell: away from a
 /// target's rows its sidelobes are so weak that most pairs need no look.
 class Sidelobes {
   public:
-    Sidelobes(const WindowResponse& range, const WindowResponse& doppler, const PeakConfig& config,
-              const CandidateList& list)
-        : range_(range),
-          doppler_(doppler),
+    Sidelobes(const Responses& response, const PeakConfig& config, const CandidateList& list)
+        : range_(response.range.sidelobe.data()),
+          doppler_(response.doppler.sidelobe.data()),
           list_(list),
           margin_(log2_from_cdb(config.sidelobe_margin_cdb)),
           dynamic_range_(log2_from_cdb(config.dynamic_range_cdb)) {}
 
     /// Whether sidelobes of the targets explain `peak`, no neighbour of theirs and not stronger than any peak
     /// before. What is far below the strongest target is never believed.
-    [[nodiscard, gnu::noinline]] bool explain(const Cell& peak) {
+    [[nodiscard]] bool explain(const Cell& peak) {
         if (occupied_ == 0) return false;
         if (peak.power < strongest_ - dynamic_range_) return true;
         const std::int32_t over_margin = peak.power - margin_;
-        const std::int16_t* range_response = range_.sidelobe.data();
-        const std::int16_t* doppler_response = doppler_.sidelobe.data();
-        const auto distance = [](int cells) { return static_cast<std::size_t>(cells) & (kWindowLength - 1); };
         // Beyond reach_ the response is less than this peak over the strongest target. (Where it rises again,
-        // by one step: see WindowResponse::sidelobe.) The spectrum at -range, a real signal's other half, is
-        // no nearer.
+        // by one step: see WindowResponse::sidelobe.)
         while (reach_ < kRangeCells &&
-               std::max(range_response[reach_ + 1], range_response[reach_ + 2]) > over_margin - strongest_) {
+               std::max(range_[reach_ + 1], range_[reach_ + 2]) > over_margin - strongest_) {
             ++reach_;
         }
         constexpr std::uint32_t kAll = ~std::uint32_t{0};
-        std::uint32_t rows = occupied_ & kAll << std::max(peak.range - reach_, 0) &
-                             kAll >> std::max(kRangeCells - 1 - peak.range - reach_, 0);
-        for (; rows != 0; rows &= rows - 1) {
-            const int row = std::countr_zero(rows);
-            const std::int32_t range = range_response[distance(row - peak.range)];
-            const std::int32_t range_mirrored = range_response[row + peak.range];
-            for (std::size_t i = last_[static_cast<std::size_t>(row)]; i != 0; i = previous_[i - 1]) {
-                const Cell target = unpack(list_[i - 1]);
-                const std::int32_t excess = over_margin - target.power;
-                if (excess >= range && excess >= range_mirrored) continue;
-                if (excess < range + doppler_response[distance(target.doppler - peak.doppler)] ||
-                    excess < range_mirrored + doppler_response[distance(target.doppler + peak.doppler)]) {
-                    return true;
-                }
-            }
-        }
-        return false;
+        const std::uint32_t rows = occupied_ & kAll << std::max(peak.range - reach_, 0) &
+                                   kAll >> std::max(kRangeCells - 1 - peak.range - reach_, 0);
+        if (rows == 0) return false;
+        if (explain(peak.range, peak.doppler, over_margin, rows)) return true;
+        // The other half of a real signal's spectrum, at -range, is no nearer.
+        const bool mirrored_near = peak.range + std::countr_zero(rows) <= reach_ ||
+                                   peak.range - std::countl_zero(rows) >= kRangeCells + 1 - reach_;
+        return mirrored_near && explain(-peak.range, -peak.doppler, over_margin, rows);
     }
     /// list[index] is a target.
     void add(std::size_t index) {
@@ -210,22 +227,51 @@ class Sidelobes {
         if (occupied_ == 0) strongest_ = target.power;
         occupied_ |= std::uint32_t{1} << target.range;
         std::uint8_t& last = last_[static_cast<std::size_t>(target.range)];
-        previous_[index] = last;
-        last = static_cast<std::uint8_t>(index + 1);
+        const auto link = static_cast<std::uint8_t>(kRangeCells + index);
+        next_[last] = link;
+        next_[link] = 0;
+        last = link;
     }
 
   private:
-    static_assert(kMaxCandidates < 256 && kRangeCells == 32);
-    const WindowResponse& range_;
-    const WindowResponse& doppler_;
+    /// Targets in these `rows` explain a peak at this place, if they are stronger by what their window's
+    /// response is below one.
+    [[nodiscard, gnu::noinline]] bool explain(int range, int doppler, std::int32_t over_margin,
+                                              std::uint32_t rows) const {
+        const auto distance = [](int cells) { return static_cast<std::size_t>(cells) & (kWindowLength - 1); };
+        for (; rows != 0; rows &= rows - 1) {
+            const int row = std::countr_zero(rows);
+            const std::int32_t in_row = range_[distance(row - range)];
+            std::size_t link = next_[static_cast<std::size_t>(row)];
+            do {
+                const Cell target = unpack(list_[link - kRangeCells]);
+                const std::int32_t excess = over_margin - target.power;
+                if (excess >= in_row) break;  // those that follow are weaker still
+                if (excess < in_row + doppler_[distance(target.doppler - doppler)]) return true;
+                link = next_[link];
+            } while (link != 0);
+        }
+        return false;
+    }
+
+    static_assert(kRangeCells + kMaxCandidates < 256 && kRangeCells == 32);
+    static constexpr auto kRows = [] {
+        std::array<std::uint8_t, kRangeCells> rows{};
+        for (std::size_t r = 0; r < kRangeCells; ++r) rows[r] = static_cast<std::uint8_t>(r);
+        return rows;
+    }();
+    const std::int16_t* range_;  ///< WindowResponse::sidelobe
+    const std::int16_t* doppler_;
     const CandidateList& list_;
     std::int32_t margin_;  ///< log2 of power, Q6.10, as the others
     std::int32_t dynamic_range_;
     std::int32_t strongest_ = 0;
-    std::uint32_t occupied_ = 0;                         ///< rows with targets, bit r
-    int reach_ = 1;                                      ///< cells
-    std::array<std::uint8_t, kRangeCells> last_{};       ///< target of each row, as index + 1 of the list
-    std::array<std::uint8_t, kMaxCandidates> previous_;  ///< the one before in its row, 0: none
+    std::uint32_t occupied_ = 0;  ///< rows with targets, bit r
+    int reach_ = 1;               ///< cells
+    // The targets of each row as a list, strongest first. Links: r is the row itself, kRangeCells + i is
+    // list[i].
+    std::array<std::uint8_t, kRangeCells + kMaxCandidates> next_;  ///< 0: none
+    std::array<std::uint8_t, kRangeCells> last_ = kRows;
 };
 
 /// Place and quality of a peak between the cells.
@@ -265,13 +311,7 @@ class Refinement {
     std::int32_t divisor_;
 };
 
-/// Both responses: of the windows along range and along Doppler.
-struct Responses {
-    const WindowResponse& range;
-    const WindowResponse& doppler;
-};
-
-[[gnu::noinline]] Place locate(const Patch& patch, const PowerMap& map, const Cell& peak,
+[[gnu::noinline]] Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
                                const Responses& response) {
     const bool has_range_above = peak.range + kReach < kRangeCells;
     const std::int32_t below =
@@ -286,36 +326,46 @@ struct Responses {
     const Guess doppler = guess(response.doppler, peak.power, map.at(peak.range, peak.doppler - 1),
                                 map.at(peak.range, peak.doppler + 1));
 
-    const packed::Pair top = packed::load(&patch.cell[kReach * patch.stride + kReach].re);
-    const int exponent = patch.exponent[kReach];
+    const auto row = static_cast<std::size_t>(peak.range);
+    const packed::Pair top = packed::load(&spectrum.row[row][static_cast<std::size_t>(peak.doppler)].re);
     // With 14 bits, so that no sum of two products overflows.
     const int bits = packed::magnitude_bits(packed::spread(top));
-    const packed::Pair rotation =
+    Alignment alignment;
+    alignment.rotation =
         packed::pack_low(packed::lane0(top) * (1 << 14) >> bits, packed::lane1(top) * (1 << 14) >> bits);
-
-    const auto weights = [](const WindowResponse& of, const Guess& guess) {
-        return &of.weight[static_cast<std::size_t>(guess.grid)][guess.mirrored ? kTaps - 1 : 0];
-    };
-    const auto next = [](const Guess& guess) { return guess.mirrored ? -1 : 1; };
-    std::array<packed::Pair, kTaps> weight;
-    const WindowResponse::Weight* w = weights(response.doppler, doppler);
-    unrolled<kTaps, 1, kTaps>([&](std::size_t j) {
-        weight[j] = packed::load(&w->amplitude);
-        w += next(doppler);
+    alignment.exponent = spectrum.row_exponent[row];
+    const WindowResponse::Lobe& range_lobe = response.range.lobe[static_cast<std::size_t>(range.grid)];
+    const WindowResponse::Lobe& doppler_lobe = response.doppler.lobe[static_cast<std::size_t>(doppler.grid)];
+    const WindowResponse::Weight* w = &doppler_lobe.weight[doppler.mirrored ? kTaps - 1 : 0];
+    for_each_index<kTaps>([&](std::size_t j) {
+        alignment.weight[j] = packed::load(&w->amplitude);
+        w += doppler.mirrored ? -1 : 1;
     });
-    std::array<RowSums, kTaps> rows;
-    sum_rows(patch, exponent, rotation, weight, rows);
+    PatchSums rows;
+    if (static_cast<unsigned>(peak.range - kReach) < kRangeCells - 2 * kReach &&
+        static_cast<unsigned>(peak.doppler - kReach) < kDopplerCells - 2 * kReach) {
+        const Complex16* cells = &spectrum.row[row - kReach][static_cast<std::size_t>(peak.doppler) - kReach];
+        const std::int16_t* exponents = &spectrum.row_exponent[row - kReach];
+        rows = [&]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
+            return PatchSums{sum_row(cells + kIndex * kDopplerCells, exponents[kIndex], alignment)...};
+        }
+        (std::make_index_sequence<kTaps>{});
+    } else {
+        const auto& w5 = alignment.weight;  // one by one: so alignment itself stays in registers
+        rows = sum_copied_rows(spectrum, peak,
+                               {alignment.rotation, {w5[0], w5[1], w5[2], w5[3], w5[4]}, alignment.exponent});
+    }
 
     std::int32_t amplitude = 0;
     std::int32_t range_sum = 0;
     std::int32_t doppler_sum = 0;
-    w = weights(response.range, range);
-    unrolled<kTaps, 1, kTaps>([&](std::size_t i) {
+    w = &range_lobe.weight[range.mirrored ? kTaps - 1 : 0];
+    for_each_index<kTaps>([&](std::size_t i) {
         const packed::Pair pair = packed::load(&w->amplitude);
         amplitude = packed::scale_add_0(rows[i].amplitude, pair, amplitude);
         range_sum = packed::scale_add_1(rows[i].amplitude, pair, range_sum);
         doppler_sum = packed::scale_add_0(rows[i].offset, pair, doppler_sum);
-        w += next(range);
+        w += range.mirrored ? -1 : 1;
     });
     Place place;
     if (amplitude > 0) {
@@ -327,62 +377,45 @@ struct Responses {
     // `amplitude` is A |rotation| / 2^8.
     const std::int32_t log2_amplitude =
         log2_q10(static_cast<std::uint32_t>(std::max(amplitude, std::int32_t{1})));
-    const std::int32_t lobe = 2 * (peak.power - log2_amplitude + (14 - 8 - bits - 2 * exponent) * kLogOne) -
-                              (2 * WindowResponse::kWeightBits + 1) * kLogOne;
-    const auto range_grid = static_cast<std::size_t>(range.grid);
-    const auto doppler_grid = static_cast<std::size_t>(doppler.grid);
-    place.range_variance =
-        lobe + response.range.offset_variance[range_grid] + response.doppler.amplitude_variance[doppler_grid];
-    place.doppler_variance =
-        lobe + response.doppler.offset_variance[doppler_grid] + response.range.amplitude_variance[range_grid];
+    const std::int32_t lobe =
+        2 * (peak.power - log2_amplitude + (14 - 8 - bits - 2 * alignment.exponent) * kLogOne) -
+        (2 * WindowResponse::kWeightBits + 1) * kLogOne;
+    place.range_variance = lobe + range_lobe.offset_variance + doppler_lobe.amplitude_variance;
+    place.doppler_variance = lobe + doppler_lobe.offset_variance + range_lobe.amplitude_variance;
     if (!has_range_above) place.range_variance += 3 * kLogOne;  // one cell of the four, and a table's step
     return place;
 }
 
-/// Where the cells around the peak are not one rectangle in memory: Doppler is cyclic, rows below cell 0 are
-/// the other half of a real signal's spectrum, X[-r, -d] = conj X[r, d], and those above the last one are not
-/// kept: zero.
-[[gnu::noinline]] Place locate_in_copy(const Spectrum& spectrum, const PowerMap& map, const Cell& peak,
-                                       const Responses& response) {
-    std::array<std::array<Complex16, kTaps>, kTaps> cells;
-    std::array<std::int16_t, kTaps> exponents;
-    for (int i = -kReach; i <= kReach; ++i) {
-        const int range = peak.range + i;
-        const auto row = static_cast<std::size_t>(std::min(std::abs(range), kRangeCells - 1));
-        const auto to = static_cast<std::size_t>(i + kReach);
-        exponents[to] = spectrum.row_exponent[row];
-        for (int j = -kReach; j <= kReach; ++j) {
-            const int doppler = range < 0 ? -(peak.doppler + j) : peak.doppler + j;
-            Complex16 cell = spectrum.row[row][static_cast<std::size_t>(doppler) & (kDopplerCells - 1)];
-            if (range < 0) cell.im = static_cast<std::int16_t>(saturate16(-cell.im));
-            if (range >= kRangeCells) cell = {};
-            cells[to][static_cast<std::size_t>(j + kReach)] = cell;
-        }
+/// From cells to the units of a detection.
+class Axis {
+  public:
+    /// `model_variance`: cells^2.
+    Axis(Real cell, Real model_variance) : cell_(cell) {
+        const Real square = cell * cell;
+        model_variance_ = square * model_variance;
+        log2_square_ =
+            std::min<std::int32_t>(log2_q10(static_cast<std::uint32_t>(square.raw())) - 30 * kLogOne, 0);
     }
-    return locate({&cells[0][0], kTaps, exponents.data()}, map, peak, response);
-}
-
-Place locate(const Spectrum& spectrum, const PowerMap& map, const Cell& peak, const Responses& response) {
-    if (static_cast<unsigned>(peak.range - kReach) >= kRangeCells - 2 * kReach ||
-        static_cast<unsigned>(peak.doppler - kReach) >= kDopplerCells - 2 * kReach) {
-        return locate_in_copy(spectrum, map, peak, response);
+    [[nodiscard]] Real position(std::int32_t cells_q15) const {
+        return cell_ * Real::from_raw(cells_q15 * (1 << (Real::fraction_bits - 15)));
     }
-    const auto row = static_cast<std::size_t>(peak.range - kReach);
-    return locate({&spectrum.row[row][static_cast<std::size_t>(peak.doppler - kReach)], kDopplerCells,
-                   &spectrum.row_exponent[row]},
-                  map, peak, response);
-}
+    /// Of noise, whose log2 in cells^2 is given, Q6.10, at most 256, and the model.
+    [[nodiscard]] Real variance(std::int32_t log2_noise) const {
+        const std::uint32_t noise_q30 = exp2_q30(std::min<std::int32_t>(log2_noise, 0) + log2_square_);
+        return Real::from_raw(saturated_sum(static_cast<std::int32_t>(noise_q30), model_variance_.raw()));
+    }
 
-/// Variance from noise, cells^2.
-Real noise_cells(std::int32_t log2_variance) {
-    const std::uint32_t noise = exp2_q30(std::min<std::int32_t>(log2_variance, 0));
-    return Real::from_raw(static_cast<std::int32_t>(noise >> (30 - Real::fraction_bits)));
-}
+  private:
+    Real cell_;
+    Real model_variance_;
+    std::int32_t log2_square_;  ///< of a cell, over 2^8, Q6.10: at most 0
+};
 
-/// log2 of power, Q6.10, in decibels: 10 log10(2) / 2^10 each.
+/// log2 of power, Q6.10, 0..63, in decibels: 10 log10(2) / 2^10 each.
 Real decibels(std::int32_t log2_power) {
-    constexpr std::int64_t kStepQ32 = 12'929'139'865;  // 10 log10(2) 2^22 / 2^10 with 20 more bits
-    return Real::from_raw(static_cast<std::int32_t>(round_shift(log2_power * kStepQ32, 20)));
+    constexpr std::uint32_t kStepQ17 = 1'616'142'483;  // of Real
+    return Real::from_raw(static_cast<std::int32_t>(
+        detail::high_product(static_cast<std::uint32_t>(log2_power) << 15, kStepQ17)));
 }
 
 }  // namespace
@@ -390,19 +423,18 @@ Real decibels(std::int32_t log2_power) {
 void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask& peaks, const OsCfar& cfar,
                    WindowKind range_window, WindowKind doppler_window, const PeakConfig& config,
                    const CellScale& scale, DetectionList& detections) {
-    const WindowResponse& range_response = window_response(range_window);
-    const WindowResponse& doppler_response = window_response(doppler_window);
+    const Responses responses{window_response(range_window), window_response(doppler_window)};
     const std::int32_t min_snr = log2_from_cdb(config.min_snr_cdb);
     const Real model_error = Real::ratio(config.model_error_mcell, 1000);
     const Real model_variance = model_error * model_error;
-    const Real range_cell2 = scale.range_cell_m * scale.range_cell_m;
-    const Real rate_cell2 = scale.rate_cell_mps * scale.rate_cell_mps;
+    const Axis range_axis(scale.range_cell_m, model_variance);
+    const Axis rate_axis(scale.rate_cell_mps, model_variance);
     const Real coupling2 = scale.coupling_s * scale.coupling_s;
     detections.count = 0;
     detections.dropped = 0;
     CandidateList list;
     const std::size_t candidates = collect(map, peaks, list, detections.dropped);
-    Sidelobes sidelobes(range_response, doppler_response, config, list);
+    Sidelobes sidelobes(responses, config, list);
     for (std::size_t c = 0; c < candidates; ++c) {
         const Cell peak = unpack(list[c]);
         if (sidelobes.explain(peak)) continue;
@@ -414,21 +446,19 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
             ++detections.dropped;
             continue;
         }
-        const Place place = locate(spectrum, map, peak, {range_response, doppler_response});
+        const Place place = locate(spectrum, map, peak, responses);
         // Doppler cells 32..63 are closing; between cell 31 and 32 the position wraps from 32 to -32.
         std::int32_t doppler_q15 = peak.doppler * (1 << 15) + place.doppler_q15;
         if (doppler_q15 >= kDopplerCells / 2 * (1 << 15)) doppler_q15 -= kDopplerCells * (1 << 15);
         const std::int32_t range_q15 = peak.range * (1 << 15) + place.range_q15;
-        constexpr int kToReal = 1 << (Real::fraction_bits - 15);
         Detection& detection = detections.item[static_cast<std::size_t>(detections.count++)];
-        detection.range_rate_mps = scale.rate_cell_mps * Real::from_raw(doppler_q15 * kToReal);
-        detection.range_m = scale.range_cell_m * Real::from_raw(range_q15 * kToReal) + scale.range_offset_m -
-                            scale.coupling_s * detection.range_rate_mps;
-        detection.rate_variance_m2ps2 =
-            rate_cell2 * (noise_cells(place.doppler_variance - snr) + model_variance);
+        const Real rate = rate_axis.position(doppler_q15);
+        const Real rate_variance = rate_axis.variance(place.doppler_variance - snr);
+        detection.range_m = range_axis.position(range_q15) + scale.range_offset_m - scale.coupling_s * rate;
+        detection.range_rate_mps = rate;
         detection.range_variance_m2 =
-            range_cell2 * (noise_cells(place.range_variance - snr) + model_variance) +
-            coupling2 * detection.rate_variance_m2ps2;
+            range_axis.variance(place.range_variance - snr) + coupling2 * rate_variance;
+        detection.rate_variance_m2ps2 = rate_variance;
         detection.snr_db = decibels(snr);
         detection.range_cell = static_cast<std::uint8_t>(peak.range);
         detection.doppler_cell = static_cast<std::uint8_t>(peak.doppler);

@@ -30,12 +30,15 @@ struct WindowResponse {
         std::int16_t amplitude;  ///< a
         std::int16_t offset;     ///< g
     };
-    /// By guess; for cells -2..2 around the peak.
-    alignas(4) std::array<std::array<Weight, kTaps>, kGrid> weight;
-    /// log2 of the variance of A (of d times A^2) for noise of power 2^-12 in each cell, Q6.10: of a' C a and
-    /// g' C g.
-    std::array<std::int16_t, kGrid> amplitude_variance;
-    std::array<std::int16_t, kGrid> offset_variance;
+    struct Lobe {
+        std::array<Weight, kTaps> weight;  ///< for cells -2..2 around the peak
+        /// log2 of the variance of A (of d times A^2) for noise of power 2^-12 in each cell, Q6.10: of a' C a
+        /// and g' C g.
+        std::int16_t amplitude_variance;
+        std::int16_t offset_variance;
+    };
+    alignas(4) std::array<Lobe, kGrid> lobe;  ///< by guess
+
     static constexpr int kRatioBits = 7;  ///< a step of one eighth of an octave
     static constexpr int kRatios = 40;
     /// Offset of a target towards a cell next to its peak cell, in grid steps, -8..8, by the power of the
@@ -184,8 +187,8 @@ constexpr WindowResponse make_response(const Window& window) {
             a[i] = divide_q24(multiply_q24(f11, u[i]) - multiply_q24(f01, v[i]), det);
             g[i] = divide_q24(multiply_q24(f00, v[i]) - multiply_q24(f01, u[i]), det);
             const int sign = i % 2 == kReach % 2 ? 1 : -1;
-            result.weight[grid][i] = {static_cast<std::int16_t>(sign * round_shift(a[i], kDown)),
-                                      static_cast<std::int16_t>(sign * round_shift(g[i], kDown))};
+            result.lobe[grid].weight[i] = {static_cast<std::int16_t>(sign * round_shift(a[i], kDown)),
+                                           static_cast<std::int16_t>(sign * round_shift(g[i], kDown))};
         }
         Vector ca{};
         Vector cg{};
@@ -197,8 +200,8 @@ constexpr WindowResponse make_response(const Window& window) {
             return static_cast<std::int16_t>(
                 log2_q10(static_cast<std::uint16_t>(round_shift(variance, kDown))));
         };
-        result.amplitude_variance[grid] = log2(dot(a, ca));
-        result.offset_variance[grid] = log2(dot(g, cg));
+        result.lobe[grid].amplitude_variance = log2(dot(a, ca));
+        result.lobe[grid].offset_variance = log2(dot(g, cg));
     }
     constexpr std::size_t kHalf = WindowResponse::kGridPerCell / 2;
     std::array<std::int32_t, 2 * kHalf + 1> ratio{};  // by offset + kHalf

@@ -57,12 +57,12 @@ TEST(WindowResponse, WeightsAreTheLeastSquaresSolution) {
             for (int i = 0; i < 5; ++i) {
                 const auto tap = static_cast<std::size_t>(i);
                 const double sign = i % 2 == 0 ? 1 : -1;  // the lobe's, from cell to cell
-                DOUBLES_EQUAL(sign * k(0, i), r.weight[grid][tap].amplitude / 4096.0, 3e-4);
-                DOUBLES_EQUAL(sign * k(1, i), r.weight[grid][tap].offset / 4096.0, 3e-4);
+                DOUBLES_EQUAL(sign * k(0, i), r.lobe[grid].weight[tap].amplitude / 4096.0, 3e-4);
+                DOUBLES_EQUAL(sign * k(1, i), r.lobe[grid].weight[tap].offset / 4096.0, 3e-4);
             }
             const Eigen::Matrix2d variance = k * c * k.transpose();
-            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(0, 0)), r.amplitude_variance[grid], 2);
-            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(1, 1)), r.offset_variance[grid], 2);
+            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(0, 0)), r.lobe[grid].amplitude_variance, 2);
+            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(1, 1)), r.lobe[grid].offset_variance, 2);
         }
     }
 }
