@@ -282,6 +282,72 @@ RowBits maxima(const MapRow& row) {
     return {rises[0] & ~rises[1], rises[1] & ~std::rotl(rises[0], 1)};
 }
 
+/// Compares the cells of a row with those above, below and at the corners, two at once.
+class ColumnCompare {
+  public:
+    /// `below`, `above`: of the two cells before the first ones and of the first ones themselves, which come
+    /// from the end of the row: Doppler is cyclic.
+    ColumnCompare(const std::uint16_t* below, const std::uint16_t* above, packed::Pair cells)
+        : before_(most(packed::load(below), packed::load(above))),
+          here_(most(packed::load(below + 2), packed::load(above + 2))),
+          cells_(cells) {}
+    /// The two cells after those given last: a comparison is one step late.
+    [[gnu::always_inline]] void next(packed::Pair below, packed::Pair above, packed::Pair cells) {
+        const packed::Pair after = most(below, above);
+        packed::Pair outer = before_ >> 16 | after << 16;  // the neighbours of both cells together
+        packed::Pair inner = here_;
+        packed::Pair largest = packed::swap(here_);
+        packed::order(inner, largest);
+        packed::order(outer, largest);
+        tops_ = tops_ << 1 | packed::at_least(packed::floored_sub(cells_, kOnes), largest);
+        before_ = here_;
+        here_ = after;
+        cells_ = cells;
+    }
+    /// A bit in each lane for every step since the last call, at most 16, the last one lowest. Cells that are
+    /// zero may pass.
+    packed::Pair take_tops() { return std::exchange(tops_, 0); }
+
+  private:
+    static constexpr packed::Pair kOnes = 0x00010001U;
+    /// What a cell less one must be at least: the one above it and the one below it less one.
+    static packed::Pair most(packed::Pair below, packed::Pair above) {
+        packed::Pair less = packed::floored_sub(below, kOnes);
+        packed::order(less, above);
+        return above;
+    }
+    packed::Pair before_;
+    packed::Pair here_;
+    packed::Pair cells_;
+    packed::Pair tops_ = 0;
+};
+
+/// The cells that are larger than those above and below and at the four corners, and perhaps some that are
+/// zero. For rows that have one on either side.
+[[gnu::noinline]] RowBits column_maxima(const PowerMap& map, std::size_t r) {
+    const std::uint16_t* row = map.cell[r].data();
+    constexpr std::ptrdiff_t kRow = kDopplerCells;
+    constexpr std::ptrdiff_t kLast = kDopplerCells - 2;
+    ColumnCompare compare(row - kRow + kLast - 2, row + kRow + kLast - 2, packed::load(row + kLast));
+    std::array<packed::Pair, 2> tops{};
+    for (packed::Pair& half : tops) {
+        for (const std::uint16_t* const end = row + kHalf; row != end; row += 4) {
+            std::array<packed::Pair, 2> below;
+            std::array<packed::Pair, 2> above;
+            std::array<packed::Pair, 2> cells;
+            packed::load_pair(row - kRow, below[0], below[1]);
+            packed::load_pair(row + kRow, above[0], above[1]);
+            packed::load_pair(row, cells[0], cells[1]);
+            compare.next(below[0], above[0], cells[0]);
+            compare.next(below[1], above[1], cells[1]);
+        }
+        half = compare.take_tops();
+    }
+    // The last two cells came first.
+    const RowBits bits = join(tops[0], tops[1]);
+    return {std::rotl(bits[0], 1), std::rotl(bits[1], 1)};
+}
+
 }  // namespace
 
 OsCfar::OsCfar(const CfarConfig& config)
@@ -602,13 +668,18 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
             const RowBits in_row = maxima(row);
             for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_row[odd];
         }
-        const Neighbours neighbours(map, r);
-        for (std::size_t odd = 0; odd < 2; ++odd) {
-            for (std::uint32_t rest = candidates[odd]; rest != 0;) {
-                const int i = take_first(rest);
-                const int d = 2 * i + static_cast<int>(odd);
-                if ((!compared && !neighbours.tops_its_row(d)) || !neighbours.tops_its_columns(d)) {
-                    candidates[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
+        if (compared && r > 0 && r + 1 < kRangeCells && !few<16>(candidates[0] | candidates[1])) {
+            const RowBits in_columns = column_maxima(map, static_cast<std::size_t>(r));
+            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_columns[odd];
+        } else {
+            const Neighbours neighbours(map, r);
+            for (std::size_t odd = 0; odd < 2; ++odd) {
+                for (std::uint32_t rest = candidates[odd]; rest != 0;) {
+                    const int i = take_first(rest);
+                    const int d = 2 * i + static_cast<int>(odd);
+                    if ((!compared && !neighbours.tops_its_row(d)) || !neighbours.tops_its_columns(d)) {
+                        candidates[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
+                    }
                 }
             }
         }
