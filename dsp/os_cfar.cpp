@@ -88,6 +88,12 @@ void for_each_range_reference(const PowerMap& map, const CfarConfig& config, int
     }
 }
 
+/// Whether all range reference cells of this row are there, on both sides.
+bool has_range_references(const CfarConfig& config, int r) {
+    const int farthest = config.range_guard + 1 + config.spacing * (config.range_reference - 1);
+    return r - farthest >= config.first_range_cell && r + farthest < kRangeCells;
+}
+
 /// One bit a cell of a row: those with even Doppler index, then those with odd, cells 2i and 2i+1 at bit
 /// 31-i. So compares shift in at the low end, and a count of leading zeros finds the cell.
 using RowBits = std::array<std::uint32_t, 2>;
@@ -236,17 +242,20 @@ class ParityRow {
         const auto split = [&row, this](std::size_t i, std::size_t at, std::size_t again) {
             packed::Pair a = 0;
             packed::Pair b = 0;
+            packed::Pair c = 0;
+            packed::Pair d = 0;
             packed::load_pair(row.data() + 2 * i, a, b);
+            packed::load_pair(row.data() + 2 * i + 4, c, d);
             const auto lane = [](packed::Pair x) { return static_cast<std::int32_t>(x); };
-            const packed::Pair evens = packed::pack_low(lane(a), lane(b));
-            const packed::Pair odds = packed::pack_high(lane(a), lane(b));
-            packed::store(&side_[0][at], evens);
-            packed::store(&side_[0][again], evens);
-            packed::store(&side_[1][at], odds);
-            packed::store(&side_[1][again], odds);
+            const auto store = [&](std::size_t side, packed::Pair first, packed::Pair second) {
+                packed::store_pair(&side_[side][at], first, second);
+                packed::store_pair(&side_[side][again], first, second);
+            };
+            store(0, packed::pack_low(lane(a), lane(b)), packed::pack_low(lane(c), lane(d)));
+            store(1, packed::pack_high(lane(a), lane(b)), packed::pack_high(lane(c), lane(d)));
         };
         constexpr std::size_t kQuarter = kHalf / 2;
-        unrolled<kQuarter, 2, 4>([&](std::size_t i) {
+        unrolled<kQuarter, 4, 2>([&](std::size_t i) {
             split(i, kQuarter + i, 3 * kQuarter + i);
             split(kQuarter + i, 2 * kQuarter + i, i);
         });
@@ -290,18 +299,23 @@ class ColumnCompare {
     ColumnCompare(const std::uint16_t* below, const std::uint16_t* above, packed::Pair cells)
         : before_(most(packed::load(below), packed::load(above))),
           here_(most(packed::load(below + 2), packed::load(above + 2))),
+          here_swapped_(packed::swap(here_)),
           cells_(cells) {}
     /// The two cells after those given last: a comparison is one step late.
     [[gnu::always_inline]] void next(packed::Pair below, packed::Pair above, packed::Pair cells) {
         const packed::Pair after = most(below, above);
-        packed::Pair outer = before_ >> 16 | after << 16;  // the neighbours of both cells together
+        const packed::Pair after_swapped = packed::swap(after);
+        // The neighbours of both cells together: one before, one after.
+        packed::Pair outer =
+            packed::pack_high(static_cast<std::int32_t>(before_), static_cast<std::int32_t>(after_swapped));
         packed::Pair inner = here_;
-        packed::Pair largest = packed::swap(here_);
+        packed::Pair largest = here_swapped_;
         packed::order(inner, largest);
         packed::order(outer, largest);
         tops_ = tops_ << 1 | packed::at_least(packed::floored_sub(cells_, kOnes), largest);
         before_ = here_;
         here_ = after;
+        here_swapped_ = after_swapped;
         cells_ = cells;
     }
     /// A bit in each lane for every step since the last call, at most 16, the last one lowest. Cells that are
@@ -318,6 +332,7 @@ class ColumnCompare {
     }
     packed::Pair before_;
     packed::Pair here_;
+    packed::Pair here_swapped_;
     packed::Pair cells_;
     packed::Pair tops_ = 0;
 };
@@ -515,9 +530,7 @@ std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell
         end = copy_doppler_references(map, config_, range_cell, doppler_cell, end);
     }
     const std::uint16_t* cell = row + doppler_cell;
-    const int farthest_range = config_.range_guard + 1 + config_.spacing * (config_.range_reference - 1);
-    if (range_cell - farthest_range >= config_.first_range_cell &&
-        range_cell + farthest_range < kRangeCells) {
+    if (has_range_references(config_, range_cell)) {
         std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config_.range_guard + 1);
         const std::ptrdiff_t step = std::ptrdiff_t{kDopplerCells} * config_.spacing;
         for (int i = config_.range_reference; i > 0; --i) {
@@ -554,6 +567,14 @@ bool few(std::uint32_t bits) {
     return bits == 0;
 }
 
+/// How many bits are set. (The compiler calls a function for it.)
+constexpr std::uint32_t count_set(std::uint32_t bits) {
+    bits -= bits >> 1 & 0x5555'5555U;
+    bits = (bits & 0x3333'3333U) + (bits >> 2 & 0x3333'3333U);
+    return ((bits + (bits >> 4)) & 0x0F0F'0F0FU) * 0x0101'0101U >> 24;
+}
+static_assert(count_set(~0U) == 32 && count_set(0) == 0 && count_set(0x8000'0701U) == 5);
+
 /// The bits of a row as in CellMask.
 std::uint64_t in_order(const RowBits& bits) {
     const auto spread = [](std::uint32_t x) {  // bits 15..0 to bits 30, 28, .. 0
@@ -571,73 +592,166 @@ std::uint64_t in_order(const RowBits& bits) {
 
 /// What the cells under test of a row have in common.
 struct RowTest {
-    std::int32_t threshold;
-    std::uint32_t most;     ///< reference cells not below the limit, of a target
-    int doppler_reference;  ///< see several_over_threshold()
-    std::array<const std::uint16_t*, std::size_t{2} * kMaxRangeReference> range_reference;  ///< their rows
-    const std::uint16_t** range_end;
+    packed::Pair threshold;  ///< in both lanes
+    packed::Pair most;       ///< in both lanes: reference cells not below the limit, of a target
+    std::array<const std::uint16_t*, std::size_t{2} * kUnrolledRange> range_reference;  ///< of the first cell
+};
+
+/// Counts, lane by lane, the reference cells that are not below a limit.
+class Count {
+  public:
+    /// The limit of `cells`; nothing is below a limit of zero.
+    Count(packed::Pair cells, packed::Pair threshold) : limit_(packed::floored_sub(cells, threshold)) {}
+    void add(packed::Pair references) { not_below_ += packed::at_least(references, limit_); }
+    [[nodiscard]] packed::Pair not_below() const { return not_below_; }
+
+  private:
+    packed::Pair limit_;
+    packed::Pair not_below_ = 0;
 };
 
 /// Those `candidates` of the even or the odd cells that are over threshold. `cells`: the cells that the bits
-/// stand for; `right`, `left`: the nearest reference cells of the first on either side; `column`: its index.
+/// stand for; `right`, `left`: the nearest reference cells of the first on either side.
 [[gnu::noinline]] std::uint32_t over_threshold(std::uint32_t candidates, const std::uint16_t* cells,
                                                const std::uint16_t* right, const std::uint16_t* left,
-                                               const RowTest& test, std::size_t column) {
-    std::uint32_t hits = 0;
+                                               const RowTest& test) {
+    static_assert(kUnrolled == 8 && kUnrolledRange == 2);
+    const std::uint16_t* const row0 = test.range_reference[0];
+    const std::uint16_t* const row1 = test.range_reference[1];
+    const std::uint16_t* const row2 = test.range_reference[2];
+    const std::uint16_t* const row3 = test.range_reference[3];
+    std::uint32_t hits = candidates;
     while (candidates != 0) {
         const int i = take_first(candidates);
-        // Nothing is below a limit of zero.
-        const packed::Pair limit =
-            packed::both(static_cast<std::uint16_t>(std::max<std::int32_t>(cells[i] - test.threshold, 0)));
-        packed::Pair not_below = 0;
-        const auto count = [&not_below, limit](packed::Pair references) {
-            not_below += packed::at_least(references, limit);
-        };
-        unrolled<kUnrolled, 2, kUnrolled / 2>([&](std::size_t k) {
-            count(packed::load(right + i + k));
-            count(packed::load(left + i - 1 - k));
-        });
-        for (int k = kUnrolled; k < test.doppler_reference; k += 2) {
-            count(packed::load(right + i + k));
-            count(packed::load(left + i - 1 - k));
-        }
-        const std::size_t d = column + 2 * static_cast<std::size_t>(i);
-        unrolled<2 * kUnrolledRange, 2, kUnrolledRange>([&](std::size_t k) {
-            count(packed::pack_low(test.range_reference[k][d], test.range_reference[k + 1][d]));
-        });
-        for (auto cell = test.range_reference.data() + 2 * kUnrolledRange; cell != test.range_end;
-             cell += 2) {
-            count(packed::pack_low(cell[0][d], cell[1][d]));
-        }
-        if ((not_below & 0xFFFFU) + (not_below >> 16) <= test.most) hits |= std::uint32_t{0x8000'0000} >> i;
+        Count count(packed::both(cells[i]), test.threshold);
+        const std::uint16_t* reference = right + i;
+        count.add(packed::load(reference));
+        count.add(packed::load(reference + 2));
+        count.add(packed::load(reference + 4));
+        count.add(packed::load(reference + 6));
+        reference = left + i;
+        count.add(packed::load(reference - 1));
+        count.add(packed::load(reference - 3));
+        count.add(packed::load(reference - 5));
+        count.add(packed::load(reference - 7));
+        count.add(packed::pack_low(row0[2 * i], row1[2 * i]));
+        count.add(packed::pack_low(row2[2 * i], row3[2 * i]));
+        const packed::Pair sum = count.not_below() + (count.not_below() << 16);
+        if (sum >> 16 > test.most >> 16) hits ^= std::uint32_t{0x8000'0000} >> i;
     }
     return hits;
 }
 
+/// The same for four neighbours where the first one's bit is set in `groups`: those that are over threshold,
+/// candidates or not. Two are tested at once, each against one reference cell, and share what they load.
+[[gnu::noinline]] std::uint32_t fours_over_threshold(std::uint32_t groups, const std::uint16_t* cells,
+                                                     const std::uint16_t* right, const std::uint16_t* left,
+                                                     const RowTest& test) {
+    std::uint32_t hits = 0;
+    while (groups != 0) {
+        const int i = take_first(groups);
+        Count first(packed::load(cells + i), test.threshold);
+        Count second(packed::load(cells + i + 2), test.threshold);
+        const auto add_to_both = [&](packed::Pair references) __attribute__((always_inline)) {
+            first.add(references);
+            second.add(references);
+        };
+        // Reference cell k of the second pair is reference cell k + 2 of the first.
+        static_assert(kUnrolled == 8);
+        for (const std::uint16_t* reference : {right + i, left + i - (kUnrolled - 1)}) {
+            first.add(packed::load(reference));
+            first.add(packed::load(reference + 1));
+            add_to_both(packed::load(reference + 2));
+            add_to_both(packed::load(reference + 3));
+            add_to_both(packed::load(reference + 4));
+            add_to_both(packed::load(reference + 5));
+            add_to_both(packed::load(reference + 6));
+            add_to_both(packed::load(reference + 7));
+            second.add(packed::load(reference + 8));
+            second.add(packed::load(reference + 9));
+        }
+        for (const std::uint16_t* row : test.range_reference) {
+            const std::uint16_t* reference = row + 2 * i;
+            first.add(packed::pack_low(reference[0], reference[2]));
+            second.add(packed::pack_low(reference[4], reference[6]));
+        }
+        const packed::Pair pass0 = packed::at_least(test.most, first.not_below());
+        const packed::Pair pass1 = packed::at_least(test.most, second.not_below());
+        const std::uint32_t bits = (pass0 << 3 | pass0 >> 14 | pass1 << 1 | pass1 >> 16) & 0xFU;
+        hits |= bits << (28 - i);
+    }
+    return hits;
+}
+
+/// The first bit of every four of which three or all are set.
+constexpr std::uint32_t mostly_set(std::uint32_t bits) {
+    const std::uint32_t both = bits & bits << 1;
+    const std::uint32_t either = bits | bits << 1;
+    return ((both & either << 2) | (either & both << 2)) & 0x8888'8888U;
+}
+static_assert(mostly_set(0x0137'F7BDU) == 0x0000'8888U + 0x0008'0000U);
+
 /// Those of several `candidates` in a row that are over threshold, as CellMask::row: the reference cells of
-/// one, laid side by side, are compared two at once. For a spacing of 2, kUnrolled or a larger even number of
-/// reference cells on each side along Doppler, kUnrolledRange or more along range, and a threshold of
-/// 0..65535.
+/// one, laid side by side, are compared two at once. For a spacing of 2, kUnrolled reference cells on each
+/// side along Doppler, kUnrolledRange along range, and a threshold of 0..65535.
 [[gnu::noinline]] std::uint64_t several_over_threshold(const PowerMap& map, const OsCfar& cfar, int r,
                                                        const RowBits& candidates) {
     const CfarConfig& config = cfar.config();
     RowTest test;
-    test.threshold = cfar.threshold();
-    test.most = static_cast<std::uint32_t>(config.reference_cells() - config.rank);
-    test.doppler_reference = config.doppler_reference;
-    test.range_end = test.range_reference.data();
-    for_each_range_reference(map, config, r, 0,
-                             [&test](const std::uint16_t* cell) { *test.range_end++ = cell; });
+    test.threshold = packed::both(static_cast<std::uint16_t>(cfar.threshold()));
+    test.most = packed::both(static_cast<std::uint16_t>(config.reference_cells() - config.rank));
+    const std::uint16_t** end = test.range_reference.data();
+    if (has_range_references(config, r)) {
+        const std::uint16_t* cell = map.cell[static_cast<std::size_t>(r)].data();
+        std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config.range_guard + 1);
+        for (int i = 0; i < kUnrolledRange; ++i) {
+            *end++ = cell + rows;
+            *end++ = cell - rows;
+            rows += std::ptrdiff_t{kDopplerCells} * config.spacing;
+        }
+    } else {
+        for_each_range_reference(map, config, r, 0, [&end](const std::uint16_t* cell) { *end++ = cell; });
+    }
     const ParityRow row(map.cell[static_cast<std::size_t>(r)]);
     const int first = config.doppler_guard + 1;
-    RowBits hits{};
-    for (std::size_t odd = 0; odd < 2; ++odd) {
-        const int d = static_cast<int>(odd);
-        hits[odd] =
-            over_threshold(candidates[odd], row.cell(d), row.cell(d + first), row.cell(d - first), test, odd);
+    const auto hits = [&](std::uint32_t single, int odd) {
+        const std::uint16_t* cells = row.cell(odd);
+        const std::uint16_t* right = row.cell(odd + first);
+        const std::uint16_t* left = row.cell(odd - first);
+        const std::uint32_t groups = mostly_set(single);
+        std::uint32_t found = 0;
+        if (groups != 0) {
+            const std::uint32_t in_groups = (groups >> 3) * 15;
+            found = fours_over_threshold(groups, cells, right, left, test) & single & in_groups;
+            single &= ~in_groups;
+        }
+        return single == 0 ? found : found | over_threshold(single, cells, right, left, test);
+    };
+    RowBits bits{};
+    if (candidates[0] != 0) bits[0] = hits(candidates[0], 0);
+    if (candidates[1] != 0) {
+        for (const std::uint16_t*& reference : test.range_reference) ++reference;
+        bits[1] = hits(candidates[1], 1);
     }
-    return in_order(hits);
+    return in_order(bits);
 }
+
+void keep(RowBits& bits, const RowBits& those) {
+    for (std::size_t odd = 0; odd < 2; ++odd) bits[odd] &= those[odd];
+}
+/// Drops the cells of which `drop(d)` holds.
+template <class Drop>
+void drop_if(RowBits& bits, Drop drop) {
+    for (std::size_t odd = 0; odd < 2; ++odd) {
+        for (std::uint32_t rest = bits[odd]; rest != 0;) {
+            const int i = take_first(rest);
+            if (drop(2 * i + static_cast<int>(odd))) bits[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
+        }
+    }
+}
+
+/// Of so many maxima in a row, to compare all cells with the rows beside it costs as much as to look at each.
+constexpr std::uint32_t kManyMaxima = 20;
 
 }  // namespace
 
@@ -651,9 +765,9 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
     const int least = config.reference_cells() - config.rank + 1;
     const bool enough = (config.doppler_reference - 1) * config.spacing >= 14 && least <= 16;
     const auto more = static_cast<std::uint32_t>(std::max(least - 9, 0));
-    const bool regular = config.spacing == 2 && config.doppler_reference >= kUnrolled &&
-                         config.doppler_reference % 2 == 0 && config.range_reference >= kUnrolledRange &&
-                         cfar.threshold() >= 0 && cfar.threshold() <= 0xFFFF;
+    const bool regular = config.spacing == 2 && config.doppler_reference == kUnrolled &&
+                         config.range_reference == kUnrolledRange && cfar.threshold() >= 0 &&
+                         cfar.threshold() <= 0xFFFF;
     for (int r = config.first_range_cell; r < kRangeCells; ++r) {
         const MapRow& row = map.cell[static_cast<std::size_t>(r)];
         RowBits candidates{~std::uint32_t{0}, ~std::uint32_t{0}};
@@ -663,24 +777,17 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
             for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] |= compares.high[odd];
         }
         // A few are compared with their neighbours one by one, many by comparing the whole row.
-        const bool compared = !few<6>(candidates[0] | candidates[1]);
-        if (compared) {
-            const RowBits in_row = maxima(row);
-            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_row[odd];
-        }
-        if (compared && r > 0 && r + 1 < kRangeCells && !few<16>(candidates[0] | candidates[1])) {
-            const RowBits in_columns = column_maxima(map, static_cast<std::size_t>(r));
-            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_columns[odd];
+        if (few<6>(candidates[0] | candidates[1])) {
+            drop_if(candidates, [neighbours = Neighbours(map, r)](int d) {
+                return !neighbours.tops_its_row(d) || !neighbours.tops_its_columns(d);
+            });
         } else {
-            const Neighbours neighbours(map, r);
-            for (std::size_t odd = 0; odd < 2; ++odd) {
-                for (std::uint32_t rest = candidates[odd]; rest != 0;) {
-                    const int i = take_first(rest);
-                    const int d = 2 * i + static_cast<int>(odd);
-                    if ((!compared && !neighbours.tops_its_row(d)) || !neighbours.tops_its_columns(d)) {
-                        candidates[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
-                    }
-                }
+            keep(candidates, maxima(row));
+            if (count_set(candidates[0] | candidates[1]) > kManyMaxima && r > 0 && r + 1 < kRangeCells) {
+                keep(candidates, column_maxima(map, static_cast<std::size_t>(r)));
+            } else {
+                drop_if(candidates,
+                        [neighbours = Neighbours(map, r)](int d) { return !neighbours.tops_its_columns(d); });
             }
         }
         // To lay a row out costs as much as to test two cells without.
