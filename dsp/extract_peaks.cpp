@@ -81,19 +81,22 @@ void sort(std::span<Candidate> list) {
                                       int& rest) {
     std::size_t count = 0;
     for (int r = 0; r < kRangeCells; ++r) {
-        for (std::uint64_t bits = peaks.row[static_cast<std::size_t>(r)]; bits != 0; bits &= bits - 1) {
-            const int d = std::countr_zero(bits);
-            const Candidate candidate = pack({r, d, map.at(r, d)});
-            if (count < list.size()) {
-                list[count++] = candidate;
-                continue;
+        const std::uint64_t row = peaks.row[static_cast<std::size_t>(r)];
+        for (int half = 0; half < kDopplerCells; half += 32) {
+            for (auto bits = static_cast<std::uint32_t>(row >> half); bits != 0; bits &= bits - 1) {
+                const int d = half + std::countr_zero(bits);
+                const Candidate candidate = pack({r, d, map.at(r, d)});
+                if (count < list.size()) {
+                    list[count++] = candidate;
+                    continue;
+                }
+                if (rest++ == 0) {
+                    for (std::size_t place = count / 2; place > 0; --place) sink(list, place - 1);
+                }
+                if (candidate < list[0]) continue;
+                list[0] = candidate;
+                sink(list, 0);
             }
-            if (rest++ == 0) {
-                for (std::size_t place = count / 2; place > 0; --place) sink(list, place - 1);
-            }
-            if (candidate < list[0]) continue;
-            list[0] = candidate;
-            sink(list, 0);
         }
     }
     sort({list.data(), count});
@@ -195,7 +198,7 @@ class Sidelobes {
     Sidelobes(const Responses& response, const PeakConfig& config, const CandidateList& list)
         : range_(response.range.sidelobe.data()),
           doppler_(response.doppler.sidelobe.data()),
-          list_(list),
+          list_(list.data()),
           margin_(log2_from_cdb(config.sidelobe_margin_cdb)),
           dynamic_range_(log2_from_cdb(config.dynamic_range_cdb)) {}
 
@@ -262,7 +265,7 @@ class Sidelobes {
     }();
     const std::int16_t* range_;  ///< WindowResponse::sidelobe
     const std::int16_t* doppler_;
-    const CandidateList& list_;
+    const Candidate* list_;
     std::int32_t margin_;  ///< log2 of power, Q6.10, as the others
     std::int32_t dynamic_range_;
     std::int32_t strongest_ = 0;
@@ -425,7 +428,10 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
                    const CellScale& scale, DetectionList& detections) {
     const Responses responses{window_response(range_window), window_response(doppler_window)};
     const std::int32_t min_snr = log2_from_cdb(config.min_snr_cdb);
-    const Real model_error = Real::ratio(config.model_error_mcell, 1000);
+    const bool none_too_weak = min_snr <= cfar.least_snr();
+    // 32 bits suffice for half a cell; no quotient lies half way between two numbers.
+    const Real model_error = Real::from_raw(static_cast<std::int32_t>(
+        ((static_cast<std::uint32_t>(config.model_error_mcell) << Real::fraction_bits) + 500) / 1000));
     const Real model_variance = model_error * model_error;
     const Axis range_axis(scale.range_cell_m, model_variance);
     const Axis rate_axis(scale.rate_cell_mps, model_variance);
@@ -439,6 +445,10 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
         const Cell peak = unpack(list[c]);
         if (sidelobes.explain(peak)) continue;
         sidelobes.add(c);
+        if (detections.count == kMaxDetections && none_too_weak) {
+            ++detections.dropped;
+            continue;
+        }
 
         const std::int32_t snr = peak.power - cfar.noise(map, peak.range, peak.doppler);
         if (snr < min_snr) continue;

@@ -82,6 +82,11 @@ class OsCfar {
     /// for another window with up to 20 reference cells; for more cells, 5 each in 16 rounds.
     [[nodiscard]] std::int32_t noise(const PowerMap& map, int range_cell, int doppler_cell) const;
 
+    /// No cell that detects() finds is less than this over its noise(): log2, Q6.10.
+    [[nodiscard]] std::int32_t least_snr() const {
+        return threshold_ - (noise_offset_ > 0 ? noise_offset_ : 0);
+    }
+
   private:
     CfarConfig config_;
     std::int32_t threshold_;
