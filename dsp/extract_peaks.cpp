@@ -62,21 +62,65 @@ constexpr Cell unpack(Candidate candidate) {
     heap[place] = candidate;
 }
 
-/// Descending, by the method of Shell (1959) with the distances of Ciura (2001).
-void sort(std::span<Candidate> list) {
-    for (const std::size_t distance : {57U, 23U, 10U, 4U, 1U}) {
-        for (std::size_t next = distance; next < list.size(); ++next) {
-            const Candidate candidate = list[next];
-            std::size_t place = next;
-            for (; place >= distance && list[place - distance] < candidate; place -= distance) {
-                list[place] = list[place - distance];
-            }
-            list[place] = candidate;
+/// Merges two descending lists, neither of them empty, into one.
+void merge(const Candidate* a, const Candidate* a_end, const Candidate* b, const Candidate* b_end,
+           Candidate* to) {
+    Candidate from_a = *a;
+    Candidate from_b = *b;
+    for (;;) {
+        if (from_a > from_b) {
+            *to++ = from_a;
+            if (++a == a_end) break;
+            from_a = *a;
+        } else {
+            *to++ = from_b;
+            if (++b == b_end) break;
+            from_b = *b;
         }
     }
+    while (a != a_end) *to++ = *a++;
+    while (b != b_end) *to++ = *b++;
 }
 
-/// Fills `list` with the strongest candidates in descending order. Returns how many; counts the rest.
+/// Sorts four neighbours, descending.
+void sort_four(Candidate* list) {
+    const auto order = [](Candidate& larger, Candidate& smaller) {
+        const Candidate least = std::min(larger, smaller);
+        larger = std::max(larger, smaller);
+        smaller = least;
+    };
+    std::array<Candidate, 4> x{list[0], list[1], list[2], list[3]};
+    order(x[0], x[1]);
+    order(x[2], x[3]);
+    order(x[0], x[2]);
+    order(x[1], x[3]);
+    order(x[1], x[2]);
+    for (std::size_t i = 0; i < x.size(); ++i) list[i] = x[i];
+}
+
+/// Descending, by merging runs of four, eight and so on. Zeros follow the last one up to the next multiple of
+/// four. Returns where the result is: there or in `other`.
+[[gnu::noinline]] const CandidateList& sort(CandidateList& list, CandidateList& other, std::size_t count) {
+    count = (count + 3) & ~std::size_t{3};
+    for (std::size_t i = 0; i < count; i += 4) sort_four(&list[i]);
+    CandidateList* from = &list;
+    CandidateList* to = &other;
+    for (std::size_t run = 4; run < count; run *= 2) {
+        for (std::size_t begin = 0; begin < count; begin += 2 * run) {
+            const Candidate* a = from->data() + begin;
+            const Candidate* end = from->data() + std::min(begin + 2 * run, count);
+            if (begin + run < count) {
+                merge(a, a + run, a + run, end, to->data() + begin);
+            } else {
+                std::copy(a, end, to->data() + begin);
+            }
+        }
+        std::swap(from, to);
+    }
+    return *from;
+}
+
+/// Fills `list` with the strongest candidates. Returns how many; counts the rest.
 [[gnu::noinline]] std::size_t collect(const PowerMap& map, const CellMask& peaks, CandidateList& list,
                                       int& rest) {
     std::size_t count = 0;
@@ -99,7 +143,7 @@ void sort(std::span<Candidate> list) {
             }
         }
     }
-    sort({list.data(), count});
+    for (std::size_t end = count; end % 4 != 0; ++end) list[end] = 0;
     return count;
 }
 
@@ -438,8 +482,10 @@ void extract_peaks(const Spectrum& spectrum, const PowerMap& map, const CellMask
     const Real coupling2 = scale.coupling_s * scale.coupling_s;
     detections.count = 0;
     detections.dropped = 0;
-    CandidateList list;
-    const std::size_t candidates = collect(map, peaks, list, detections.dropped);
+    CandidateList memory;
+    CandidateList more_memory;
+    const std::size_t candidates = collect(map, peaks, memory, detections.dropped);
+    const CandidateList& list = sort(memory, more_memory, candidates);
     Sidelobes sidelobes(responses, config, list);
     for (std::size_t c = 0; c < candidates; ++c) {
         const Cell peak = unpack(list[c]);
