@@ -214,15 +214,20 @@ using PatchSums = std::array<RowSums, kTaps>;
         if (range < kRangeCells) {
             const auto row = static_cast<std::size_t>(std::abs(range));
             const int first = (range < 0 ? -peak.doppler : peak.doppler) - kReach;
-            std::array<Complex16, kTaps> cells;
-            for (std::size_t j = 0; j < kTaps; ++j) {
-                cells[j] = spectrum.row[row][(static_cast<std::size_t>(first) + j) & (kDopplerCells - 1)];
+            std::array<Complex16, kTaps> copy;
+            const Complex16* cells = copy.data();
+            if (range < 0 || static_cast<unsigned>(first) > kDopplerCells - kTaps) {
+                for (std::size_t j = 0; j < kTaps; ++j) {
+                    copy[j] = spectrum.row[row][(static_cast<std::size_t>(first) + j) & (kDopplerCells - 1)];
+                }
+                if (range < 0) {
+                    std::ranges::reverse(copy);
+                    for (Complex16& x : copy) x.im = static_cast<std::int16_t>(saturate16(-x.im));
+                }
+            } else {
+                cells = &spectrum.row[row][static_cast<std::size_t>(first)];
             }
-            if (range < 0) {
-                std::ranges::reverse(cells);
-                for (Complex16& x : cells) x.im = static_cast<std::int16_t>(saturate16(-x.im));
-            }
-            row_sums = sum_row(cells.data(), spectrum.row_exponent[row], alignment);
+            row_sums = sum_row(cells, spectrum.row_exponent[row], alignment);
         }
         ++range;
     }
@@ -251,17 +256,12 @@ class Sidelobes {
     [[nodiscard]] bool explain(const Cell& peak) {
         if (occupied_ == 0) return false;
         if (peak.power < strongest_ - dynamic_range_) return true;
-        const std::int32_t over_margin = peak.power - margin_;
-        // Beyond reach_ the response is less than this peak over the strongest target. (Where it rises again,
-        // by one step: see WindowResponse::sidelobe.)
-        while (reach_ < kRangeCells &&
-               std::max(range_[reach_ + 1], range_[reach_ + 2]) > over_margin - strongest_) {
-            ++reach_;
-        }
+        while (peak.power < enough_) widen();
         constexpr std::uint32_t kAll = ~std::uint32_t{0};
         const std::uint32_t rows = occupied_ & kAll << std::max(peak.range - reach_, 0) &
                                    kAll >> std::max(kRangeCells - 1 - peak.range - reach_, 0);
         if (rows == 0) return false;
+        const std::int32_t over_margin = peak.power - margin_;
         if (explain(peak.range, peak.doppler, over_margin, rows)) return true;
         // The other half of a real signal's spectrum, at -range, is no nearer.
         const bool mirrored_near = peak.range + std::countr_zero(rows) <= reach_ ||
@@ -271,7 +271,10 @@ class Sidelobes {
     /// list[index] is a target.
     void add(std::size_t index) {
         const Cell target = unpack(list_[index]);
-        if (occupied_ == 0) strongest_ = target.power;
+        if (occupied_ == 0) {
+            strongest_ = target.power;
+            widen();
+        }
         occupied_ |= std::uint32_t{1} << target.range;
         std::uint8_t& last = last_[static_cast<std::size_t>(target.range)];
         const auto link = static_cast<std::uint8_t>(kRangeCells + index);
@@ -285,6 +288,7 @@ class Sidelobes {
     /// response is below one.
     [[nodiscard, gnu::noinline]] bool explain(int range, int doppler, std::int32_t over_margin,
                                               std::uint32_t rows) const {
+        const std::int16_t* const doppler_response = doppler_;
         const auto distance = [](int cells) { return static_cast<std::size_t>(cells) & (kWindowLength - 1); };
         for (; rows != 0; rows &= rows - 1) {
             const int row = std::countr_zero(rows);
@@ -294,11 +298,20 @@ class Sidelobes {
                 const Cell target = unpack(list_[link - kRangeCells]);
                 const std::int32_t excess = over_margin - target.power;
                 if (excess >= in_row) break;  // those that follow are weaker still
-                if (excess < in_row + doppler_[distance(target.doppler - doppler)]) return true;
+                if (excess < in_row + doppler_response[distance(target.doppler - doppler)]) return true;
                 link = next_[link];
             } while (link != 0);
         }
         return false;
+    }
+
+    /// Beyond reach_ the response is less than a peak of power enough_ over the strongest target. (Where it
+    /// rises again, by one step: see WindowResponse::sidelobe.)
+    void widen() {
+        ++reach_;
+        enough_ = reach_ == kRangeCells
+                      ? 0
+                      : std::max(range_[reach_ + 1], range_[reach_ + 2]) + strongest_ + margin_;
     }
 
     static_assert(kRangeCells + kMaxCandidates < 256 && kRangeCells == 32);
@@ -314,7 +327,8 @@ class Sidelobes {
     std::int32_t dynamic_range_;
     std::int32_t strongest_ = 0;
     std::uint32_t occupied_ = 0;  ///< rows with targets, bit r
-    int reach_ = 1;               ///< cells
+    int reach_ = 0;               ///< cells
+    std::int32_t enough_ = 0;
     // The targets of each row as a list, strongest first. Links: r is the row itself, kRangeCells + i is
     // list[i].
     std::array<std::uint8_t, kRangeCells + kMaxCandidates> next_;  ///< 0: none
