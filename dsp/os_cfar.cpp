@@ -88,6 +88,12 @@ void for_each_range_reference(const PowerMap& map, const CfarConfig& config, int
     }
 }
 
+/// Whether all range reference cells of this row are there, on both sides.
+bool has_range_references(const CfarConfig& config, int r) {
+    const int farthest = config.range_guard + 1 + config.spacing * (config.range_reference - 1);
+    return r - farthest >= config.first_range_cell && r + farthest < kRangeCells;
+}
+
 /// One bit a cell of a row: those with even Doppler index, then those with odd, cells 2i and 2i+1 at bit
 /// 31-i. So compares shift in at the low end, and a count of leading zeros finds the cell.
 using RowBits = std::array<std::uint32_t, 2>;
@@ -236,17 +242,20 @@ class ParityRow {
         const auto split = [&row, this](std::size_t i, std::size_t at, std::size_t again) {
             packed::Pair a = 0;
             packed::Pair b = 0;
+            packed::Pair c = 0;
+            packed::Pair d = 0;
             packed::load_pair(row.data() + 2 * i, a, b);
+            packed::load_pair(row.data() + 2 * i + 4, c, d);
             const auto lane = [](packed::Pair x) { return static_cast<std::int32_t>(x); };
-            const packed::Pair evens = packed::pack_low(lane(a), lane(b));
-            const packed::Pair odds = packed::pack_high(lane(a), lane(b));
-            packed::store(&side_[0][at], evens);
-            packed::store(&side_[0][again], evens);
-            packed::store(&side_[1][at], odds);
-            packed::store(&side_[1][again], odds);
+            const auto store = [&](std::size_t side, packed::Pair first, packed::Pair second) {
+                packed::store_pair(&side_[side][at], first, second);
+                packed::store_pair(&side_[side][again], first, second);
+            };
+            store(0, packed::pack_low(lane(a), lane(b)), packed::pack_low(lane(c), lane(d)));
+            store(1, packed::pack_high(lane(a), lane(b)), packed::pack_high(lane(c), lane(d)));
         };
         constexpr std::size_t kQuarter = kHalf / 2;
-        unrolled<kQuarter, 2, 4>([&](std::size_t i) {
+        unrolled<kQuarter, 4, 2>([&](std::size_t i) {
             split(i, kQuarter + i, 3 * kQuarter + i);
             split(kQuarter + i, 2 * kQuarter + i, i);
         });
@@ -282,6 +291,78 @@ RowBits maxima(const MapRow& row) {
     return {rises[0] & ~rises[1], rises[1] & ~std::rotl(rises[0], 1)};
 }
 
+/// Compares the cells of a row with those above, below and at the corners, two at once.
+class ColumnCompare {
+  public:
+    /// `below`, `above`: of the two cells before the first ones and of the first ones themselves, which come
+    /// from the end of the row: Doppler is cyclic.
+    ColumnCompare(const std::uint16_t* below, const std::uint16_t* above, packed::Pair cells)
+        : before_(most(packed::load(below), packed::load(above))),
+          here_(most(packed::load(below + 2), packed::load(above + 2))),
+          here_swapped_(packed::swap(here_)),
+          cells_(cells) {}
+    /// The two cells after those given last: a comparison is one step late.
+    [[gnu::always_inline]] void next(packed::Pair below, packed::Pair above, packed::Pair cells) {
+        const packed::Pair after = most(below, above);
+        const packed::Pair after_swapped = packed::swap(after);
+        // The neighbours of both cells together: one before, one after.
+        packed::Pair outer =
+            packed::pack_high(static_cast<std::int32_t>(before_), static_cast<std::int32_t>(after_swapped));
+        packed::Pair inner = here_;
+        packed::Pair largest = here_swapped_;
+        packed::order(inner, largest);
+        packed::order(outer, largest);
+        tops_ = tops_ << 1 | packed::at_least(packed::floored_sub(cells_, kOnes), largest);
+        before_ = here_;
+        here_ = after;
+        here_swapped_ = after_swapped;
+        cells_ = cells;
+    }
+    /// A bit in each lane for every step since the last call, at most 16, the last one lowest. Cells that are
+    /// zero may pass.
+    packed::Pair take_tops() { return std::exchange(tops_, 0); }
+
+  private:
+    static constexpr packed::Pair kOnes = 0x00010001U;
+    /// What a cell less one must be at least: the one above it and the one below it less one.
+    static packed::Pair most(packed::Pair below, packed::Pair above) {
+        packed::Pair less = packed::floored_sub(below, kOnes);
+        packed::order(less, above);
+        return above;
+    }
+    packed::Pair before_;
+    packed::Pair here_;
+    packed::Pair here_swapped_;
+    packed::Pair cells_;
+    packed::Pair tops_ = 0;
+};
+
+/// The cells that are larger than those above and below and at the four corners, and perhaps some that are
+/// zero. For rows that have one on either side.
+[[gnu::noinline]] RowBits column_maxima(const PowerMap& map, std::size_t r) {
+    const std::uint16_t* row = map.cell[r].data();
+    constexpr std::ptrdiff_t kRow = kDopplerCells;
+    constexpr std::ptrdiff_t kLast = kDopplerCells - 2;
+    ColumnCompare compare(row - kRow + kLast - 2, row + kRow + kLast - 2, packed::load(row + kLast));
+    std::array<packed::Pair, 2> tops{};
+    for (packed::Pair& half : tops) {
+        for (const std::uint16_t* const end = row + kHalf; row != end; row += 4) {
+            std::array<packed::Pair, 2> below;
+            std::array<packed::Pair, 2> above;
+            std::array<packed::Pair, 2> cells;
+            packed::load_pair(row - kRow, below[0], below[1]);
+            packed::load_pair(row + kRow, above[0], above[1]);
+            packed::load_pair(row, cells[0], cells[1]);
+            compare.next(below[0], above[0], cells[0]);
+            compare.next(below[1], above[1], cells[1]);
+        }
+        half = compare.take_tops();
+    }
+    // The last two cells came first.
+    const RowBits bits = join(tops[0], tops[1]);
+    return {std::rotl(bits[0], 1), std::rotl(bits[1], 1)};
+}
+
 }  // namespace
 
 OsCfar::OsCfar(const CfarConfig& config)
@@ -313,65 +394,84 @@ bool OsCfar::detects(const PowerMap& map, int range_cell, int doppler_cell) cons
 
 namespace {
 
+constexpr int kUnrolled = 8;  ///< reference cells on a side along Doppler, and along range
+constexpr int kUnrolledRange = 2;
+
 constexpr int kPairsSorted = 10;  ///< of reference cells, as many as the default configuration has
 
 struct Exchange {
-    std::size_t low;
-    std::size_t high;
+    std::uint8_t low;
+    std::uint8_t high;
 };
 
-/// Calls `visit(exchange)` for Batcher's merge exchange (1968) of kPairsSorted numbers.
-template <class Visit>
-constexpr void for_each_exchange(Visit visit) {
-    constexpr std::size_t kSize = kPairsSorted;
-    constexpr std::size_t kTop = std::bit_ceil(kSize) / 2;
-    for (std::size_t p = kTop; p > 0; p /= 2) {
-        std::size_t remainder = 0;
-        std::size_t distance = p;
-        for (std::size_t q = kTop;; q /= 2) {
-            for (std::size_t i = 0; i + distance < kSize; ++i) {
-                if ((i & p) == remainder) visit(Exchange{i, i + distance});
-            }
-            if (q == p) break;
-            distance = q - p;
-            remainder = p;
+/// Sorts kPairsSorted numbers with the fewest exchanges possible (Waksman 1969).
+constexpr std::array<Exchange, 29> kNetwork{{{0, 8}, {1, 9}, {2, 7}, {3, 5}, {4, 6}, {0, 2}, {1, 4}, {5, 8},
+                                             {7, 9}, {0, 3}, {2, 4}, {5, 7}, {6, 9}, {0, 1}, {3, 6}, {8, 9},
+                                             {1, 5}, {2, 3}, {4, 8}, {6, 7}, {1, 2}, {3, 5}, {4, 6}, {7, 8},
+                                             {2, 3}, {4, 5}, {6, 7}, {3, 4}, {5, 6}}};
+/// What sorts zeros and ones sorts everything (Knuth).
+constexpr bool sorts() {
+    for (unsigned numbers = 0; numbers < 1U << kPairsSorted; ++numbers) {
+        unsigned bits = numbers;
+        for (const Exchange& exchange : kNetwork) {
+            const unsigned change = (bits >> exchange.low & ~(bits >> exchange.high)) & 1U;
+            bits ^= change << exchange.low | change << exchange.high;
         }
+        const unsigned zeros = ~bits & ((1U << kPairsSorted) - 1);
+        if ((zeros & (zeros + 1)) != 0) return false;
     }
+    return true;
+}
+static_assert(sorts());
+
+/// Two lists in two lanes, ascending, after a zero.
+using SortedPairs = std::array<packed::Pair, 1 + kPairsSorted>;
+
+/// Every other one of twice kPairsSorted numbers and the rest.
+template <std::size_t... kLane, std::size_t... kIndex>
+SortedPairs sort_in_lanes(const std::uint16_t* numbers, std::index_sequence<kLane...> /*lanes*/,
+                          std::index_sequence<kIndex...> /*exchanges*/) {
+    SortedPairs lanes{0, packed::load(numbers + 2 * kLane)...};
+    (packed::order(lanes[1 + kNetwork[kIndex].low], lanes[1 + kNetwork[kIndex].high]), ...);
+    return lanes;
 }
 
-constexpr std::size_t kExchanges = [] {
-    std::size_t count = 0;
-    for_each_exchange([&count](Exchange) { ++count; });
-    return count;
-}();
+/// Lowers `least`, lane by lane, to the larger of the last of i smallest in one list and the last of j
+/// smallest in the other.
+void lower(packed::Pair& least, packed::Pair i_smallest, packed::Pair j_smallest) {
+    packed::Pair larger = packed::swap(j_smallest);
+    packed::order(i_smallest, larger);
+    packed::order(least, larger);
+}
 
-constexpr auto kNetwork = [] {
-    std::array<Exchange, kExchanges> network{};
-    std::size_t count = 0;
-    for_each_exchange([&](Exchange exchange) { network[count++] = exchange; });
-    return network;
-}();
+// The rank-th smallest in both lists: of i smallest of one and rank - i of the other the larger; the right i
+// gives the least. The rank of the default configuration is known early enough to do without memory.
 
-/// The rank-th smallest of twice kPairsSorted numbers: sorts every other one and the rest at once, in two
-/// lanes, and merges.
-std::uint16_t select_by_sorting(const std::uint16_t* numbers, int rank) {
-    std::array<packed::Pair, kPairsSorted> lanes{};
-    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { lanes[i] = packed::load(numbers + 2 * i); });
-    [&lanes]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
-        (packed::order(lanes[kNetwork[kIndex].low], lanes[kNetwork[kIndex].high]), ...);
-    }
-    (std::make_index_sequence<kExchanges>{});
-    // Of i smallest of one lane and rank - i of the other the larger: the right i gives the least.
-    std::array<packed::Pair, 1 + kPairsSorted> sorted;
-    sorted[0] = 0;
-    unrolled<kPairsSorted, 1, kPairsSorted>([&](std::size_t i) { sorted[1 + i] = lanes[i]; });
+packed::Pair merge(const SortedPairs& sorted, int rank) {
     packed::Pair least = packed::both(0xFFFF);
-    int j = std::min(rank, kPairsSorted);
-    for (int i = rank - j; i <= j; ++i, --j) {
-        packed::Pair low = sorted[static_cast<std::size_t>(i)];
-        packed::Pair high = packed::swap(sorted[static_cast<std::size_t>(j)]);
-        packed::order(low, high);
-        packed::order(least, high);
+    const packed::Pair* last = &sorted[static_cast<std::size_t>(std::min(rank, kPairsSorted))];
+    const packed::Pair* first = &sorted[static_cast<std::size_t>(std::max(rank - kPairsSorted, 0))];
+    for (; first <= last; ++first, --last) lower(least, *first, *last);
+    return least;
+}
+constexpr std::size_t kUsualRank = CfarConfig{}.rank;
+template <std::size_t... kIndex>
+packed::Pair merge_at_usual_rank(const SortedPairs& sorted, std::index_sequence<kIndex...> /*half*/) {
+    packed::Pair least = packed::both(0xFFFF);
+    (lower(least, sorted[kUsualRank - kPairsSorted + kIndex], sorted[kPairsSorted - kIndex]), ...);
+    return least;
+}
+
+/// The rank-th smallest of twice kPairsSorted numbers.
+std::uint16_t select_by_sorting(const std::uint16_t* numbers, int rank) {
+    const SortedPairs sorted = sort_in_lanes(numbers, std::make_index_sequence<kPairsSorted>{},
+                                             std::make_index_sequence<kNetwork.size()>{});
+    packed::Pair least = 0;
+    if (rank == kUsualRank) {
+        least = merge_at_usual_rank(sorted, std::make_index_sequence<kPairsSorted - kUsualRank / 2 + 1>{});
+    } else {
+        const SortedPairs in_memory = sorted;
+        least = merge(in_memory, rank);
     }
     return static_cast<std::uint16_t>(std::min(least & 0xFFFFU, least >> 16));
 }
@@ -391,18 +491,56 @@ std::uint16_t select_by_counting(std::span<const std::uint16_t> numbers, int ran
     return static_cast<std::uint16_t>(selected);
 }
 
+/// Copies the reference cells along Doppler of any number and spacing. Returns the end of the copy.
+[[gnu::noinline]] std::uint16_t* copy_doppler_references(const PowerMap& map, const CfarConfig& config, int r,
+                                                         int d, std::uint16_t* end) {
+    for_each_doppler_reference(map, config, r, d, [&end](std::uint16_t right, std::uint16_t left) {
+        packed::store(end, packed::pack_low(right, left));
+        end += 2;
+    });
+    return end;
+}
+/// Those along range at the ends of the map.
+[[gnu::noinline]] std::uint16_t* copy_range_references(const PowerMap& map, const CfarConfig& config, int r,
+                                                       int d, std::uint16_t* end) {
+    for_each_range_reference(map, config, r, d,
+                             [&end](const std::uint16_t* reference) { *end++ = *reference; });
+    return end;
+}
+
 }  // namespace
 
 std::int32_t OsCfar::noise(const PowerMap& map, int range_cell, int doppler_cell) const {
     alignas(4) std::array<std::uint16_t, kMaxReferenceCells> cells;
     std::uint16_t* end = cells.data();
-    for_each_doppler_reference(map, config_, range_cell, doppler_cell,
-                               [&end](std::uint16_t right, std::uint16_t left) {
-                                   packed::store(end, packed::pack_low(right, left));
-                                   end += 2;
-                               });
-    for_each_range_reference(map, config_, range_cell, doppler_cell,
-                             [&end](const std::uint16_t* cell) { *end++ = *cell; });
+    const std::uint16_t* row = map.cell[static_cast<std::size_t>(range_cell)].data();
+    if (config_.doppler_reference == kUnrolled && config_.spacing == 2) {
+        const auto nearest = static_cast<std::size_t>(config_.doppler_guard) + 1;
+        const std::size_t right = static_cast<std::size_t>(doppler_cell) + nearest;
+        const std::size_t left = static_cast<std::size_t>(doppler_cell) - nearest;
+        const auto pair = [=](std::size_t i) {
+            return packed::pack_low(row[(right + i) & kDopplerMask], row[(left - i) & kDopplerMask]);
+        };
+        [=]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
+            (packed::store_pair(end + 4 * kIndex, pair(4 * kIndex), pair(4 * kIndex + 2)), ...);
+        }
+        (std::make_index_sequence<kUnrolled / 2>{});
+        end += 2 * kUnrolled;
+    } else {
+        end = copy_doppler_references(map, config_, range_cell, doppler_cell, end);
+    }
+    const std::uint16_t* cell = row + doppler_cell;
+    if (has_range_references(config_, range_cell)) {
+        std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config_.range_guard + 1);
+        const std::ptrdiff_t step = std::ptrdiff_t{kDopplerCells} * config_.spacing;
+        for (int i = config_.range_reference; i > 0; --i) {
+            packed::store(end, packed::pack_low(cell[rows], cell[-rows]));
+            end += 2;
+            rows += step;
+        }
+    } else {
+        end = copy_range_references(map, config_, range_cell, doppler_cell, end);
+    }
     std::int32_t selected = 0;
     if (end - cells.data() <= 2 * kPairsSorted) {
         std::fill(end, cells.data() + 2 * kPairsSorted, std::uint16_t{0xFFFF});
@@ -429,6 +567,14 @@ bool few(std::uint32_t bits) {
     return bits == 0;
 }
 
+/// How many bits are set. (The compiler calls a function for it.)
+constexpr std::uint32_t count_set(std::uint32_t bits) {
+    bits -= bits >> 1 & 0x5555'5555U;
+    bits = (bits & 0x3333'3333U) + (bits >> 2 & 0x3333'3333U);
+    return ((bits + (bits >> 4)) & 0x0F0F'0F0FU) * 0x0101'0101U >> 24;
+}
+static_assert(count_set(~0U) == 32 && count_set(0) == 0 && count_set(0x8000'0701U) == 5);
+
 /// The bits of a row as in CellMask.
 std::uint64_t in_order(const RowBits& bits) {
     const auto spread = [](std::uint32_t x) {  // bits 15..0 to bits 30, 28, .. 0
@@ -444,78 +590,168 @@ std::uint64_t in_order(const RowBits& bits) {
     return low | std::uint64_t{high} << 32;
 }
 
-constexpr int kUnrolled = 8;  ///< reference cells on a side along Doppler, and along range
-constexpr int kUnrolledRange = 2;
-
 /// What the cells under test of a row have in common.
 struct RowTest {
-    std::int32_t threshold;
-    std::uint32_t most;     ///< reference cells not below the limit, of a target
-    int doppler_reference;  ///< see several_over_threshold()
-    std::array<const std::uint16_t*, std::size_t{2} * kMaxRangeReference> range_reference;  ///< their rows
-    const std::uint16_t** range_end;
+    packed::Pair threshold;  ///< in both lanes
+    packed::Pair most;       ///< in both lanes: reference cells not below the limit, of a target
+    std::array<const std::uint16_t*, std::size_t{2} * kUnrolledRange> range_reference;  ///< of the first cell
+};
+
+/// Counts, lane by lane, the reference cells that are not below a limit.
+class Count {
+  public:
+    /// The limit of `cells`; nothing is below a limit of zero.
+    Count(packed::Pair cells, packed::Pair threshold) : limit_(packed::floored_sub(cells, threshold)) {}
+    void add(packed::Pair references) { not_below_ += packed::at_least(references, limit_); }
+    [[nodiscard]] packed::Pair not_below() const { return not_below_; }
+
+  private:
+    packed::Pair limit_;
+    packed::Pair not_below_ = 0;
 };
 
 /// Those `candidates` of the even or the odd cells that are over threshold. `cells`: the cells that the bits
-/// stand for; `right`, `left`: the nearest reference cells of the first on either side; `column`: its index.
+/// stand for; `right`, `left`: the nearest reference cells of the first on either side.
 [[gnu::noinline]] std::uint32_t over_threshold(std::uint32_t candidates, const std::uint16_t* cells,
                                                const std::uint16_t* right, const std::uint16_t* left,
-                                               const RowTest& test, std::size_t column) {
-    std::uint32_t hits = 0;
+                                               const RowTest& test) {
+    static_assert(kUnrolled == 8 && kUnrolledRange == 2);
+    const std::uint16_t* const row0 = test.range_reference[0];
+    const std::uint16_t* const row1 = test.range_reference[1];
+    const std::uint16_t* const row2 = test.range_reference[2];
+    const std::uint16_t* const row3 = test.range_reference[3];
+    std::uint32_t hits = candidates;
     while (candidates != 0) {
         const int i = take_first(candidates);
-        // Nothing is below a limit of zero.
-        const packed::Pair limit =
-            packed::both(static_cast<std::uint16_t>(std::max<std::int32_t>(cells[i] - test.threshold, 0)));
-        packed::Pair not_below = 0;
-        const auto count = [&not_below, limit](packed::Pair references) {
-            not_below += packed::at_least(references, limit);
-        };
-        unrolled<kUnrolled, 2, kUnrolled / 2>([&](std::size_t k) {
-            count(packed::load(right + i + k));
-            count(packed::load(left + i - 1 - k));
-        });
-        for (int k = kUnrolled; k < test.doppler_reference; k += 2) {
-            count(packed::load(right + i + k));
-            count(packed::load(left + i - 1 - k));
-        }
-        const std::size_t d = column + 2 * static_cast<std::size_t>(i);
-        unrolled<2 * kUnrolledRange, 2, kUnrolledRange>([&](std::size_t k) {
-            count(packed::pack_low(test.range_reference[k][d], test.range_reference[k + 1][d]));
-        });
-        for (auto cell = test.range_reference.data() + 2 * kUnrolledRange; cell != test.range_end;
-             cell += 2) {
-            count(packed::pack_low(cell[0][d], cell[1][d]));
-        }
-        if ((not_below & 0xFFFFU) + (not_below >> 16) <= test.most) hits |= std::uint32_t{0x8000'0000} >> i;
+        Count count(packed::both(cells[i]), test.threshold);
+        const std::uint16_t* reference = right + i;
+        count.add(packed::load(reference));
+        count.add(packed::load(reference + 2));
+        count.add(packed::load(reference + 4));
+        count.add(packed::load(reference + 6));
+        reference = left + i;
+        count.add(packed::load(reference - 1));
+        count.add(packed::load(reference - 3));
+        count.add(packed::load(reference - 5));
+        count.add(packed::load(reference - 7));
+        count.add(packed::pack_low(row0[2 * i], row1[2 * i]));
+        count.add(packed::pack_low(row2[2 * i], row3[2 * i]));
+        const packed::Pair sum = count.not_below() + (count.not_below() << 16);
+        if (sum >> 16 > test.most >> 16) hits ^= std::uint32_t{0x8000'0000} >> i;
     }
     return hits;
 }
 
+/// The same for four neighbours where the first one's bit is set in `groups`: those that are over threshold,
+/// candidates or not. Two are tested at once, each against one reference cell, and share what they load.
+[[gnu::noinline]] std::uint32_t fours_over_threshold(std::uint32_t groups, const std::uint16_t* cells,
+                                                     const std::uint16_t* right, const std::uint16_t* left,
+                                                     const RowTest& test) {
+    std::uint32_t hits = 0;
+    while (groups != 0) {
+        const int i = take_first(groups);
+        Count first(packed::load(cells + i), test.threshold);
+        Count second(packed::load(cells + i + 2), test.threshold);
+        const auto add_to_both = [&](packed::Pair references) __attribute__((always_inline)) {
+            first.add(references);
+            second.add(references);
+        };
+        // Reference cell k of the second pair is reference cell k + 2 of the first.
+        static_assert(kUnrolled == 8);
+        for (const std::uint16_t* reference : {right + i, left + i - (kUnrolled - 1)}) {
+            first.add(packed::load(reference));
+            first.add(packed::load(reference + 1));
+            add_to_both(packed::load(reference + 2));
+            add_to_both(packed::load(reference + 3));
+            add_to_both(packed::load(reference + 4));
+            add_to_both(packed::load(reference + 5));
+            add_to_both(packed::load(reference + 6));
+            add_to_both(packed::load(reference + 7));
+            second.add(packed::load(reference + 8));
+            second.add(packed::load(reference + 9));
+        }
+        for (const std::uint16_t* row : test.range_reference) {
+            const std::uint16_t* reference = row + 2 * i;
+            first.add(packed::pack_low(reference[0], reference[2]));
+            second.add(packed::pack_low(reference[4], reference[6]));
+        }
+        const packed::Pair pass0 = packed::at_least(test.most, first.not_below());
+        const packed::Pair pass1 = packed::at_least(test.most, second.not_below());
+        const std::uint32_t bits = (pass0 << 3 | pass0 >> 14 | pass1 << 1 | pass1 >> 16) & 0xFU;
+        hits |= bits << (28 - i);
+    }
+    return hits;
+}
+
+/// The first bit of every four of which three or all are set.
+constexpr std::uint32_t mostly_set(std::uint32_t bits) {
+    const std::uint32_t both = bits & bits << 1;
+    const std::uint32_t either = bits | bits << 1;
+    return ((both & either << 2) | (either & both << 2)) & 0x8888'8888U;
+}
+static_assert(mostly_set(0x0137'F7BDU) == 0x0000'8888U + 0x0008'0000U);
+
 /// Those of several `candidates` in a row that are over threshold, as CellMask::row: the reference cells of
-/// one, laid side by side, are compared two at once. For a spacing of 2, kUnrolled or a larger even number of
-/// reference cells on each side along Doppler, kUnrolledRange or more along range, and a threshold of
-/// 0..65535.
+/// one, laid side by side, are compared two at once. For a spacing of 2, kUnrolled reference cells on each
+/// side along Doppler, kUnrolledRange along range, and a threshold of 0..65535.
 [[gnu::noinline]] std::uint64_t several_over_threshold(const PowerMap& map, const OsCfar& cfar, int r,
                                                        const RowBits& candidates) {
     const CfarConfig& config = cfar.config();
     RowTest test;
-    test.threshold = cfar.threshold();
-    test.most = static_cast<std::uint32_t>(config.reference_cells() - config.rank);
-    test.doppler_reference = config.doppler_reference;
-    test.range_end = test.range_reference.data();
-    for_each_range_reference(map, config, r, 0,
-                             [&test](const std::uint16_t* cell) { *test.range_end++ = cell; });
+    test.threshold = packed::both(static_cast<std::uint16_t>(cfar.threshold()));
+    test.most = packed::both(static_cast<std::uint16_t>(config.reference_cells() - config.rank));
+    const std::uint16_t** end = test.range_reference.data();
+    if (has_range_references(config, r)) {
+        const std::uint16_t* cell = map.cell[static_cast<std::size_t>(r)].data();
+        std::ptrdiff_t rows = std::ptrdiff_t{kDopplerCells} * (config.range_guard + 1);
+        for (int i = 0; i < kUnrolledRange; ++i) {
+            *end++ = cell + rows;
+            *end++ = cell - rows;
+            rows += std::ptrdiff_t{kDopplerCells} * config.spacing;
+        }
+    } else {
+        for_each_range_reference(map, config, r, 0, [&end](const std::uint16_t* cell) { *end++ = cell; });
+    }
     const ParityRow row(map.cell[static_cast<std::size_t>(r)]);
     const int first = config.doppler_guard + 1;
-    RowBits hits{};
-    for (std::size_t odd = 0; odd < 2; ++odd) {
-        const int d = static_cast<int>(odd);
-        hits[odd] =
-            over_threshold(candidates[odd], row.cell(d), row.cell(d + first), row.cell(d - first), test, odd);
+    const auto hits = [&](std::uint32_t single, int odd) {
+        const std::uint16_t* cells = row.cell(odd);
+        const std::uint16_t* right = row.cell(odd + first);
+        const std::uint16_t* left = row.cell(odd - first);
+        const std::uint32_t groups = mostly_set(single);
+        std::uint32_t found = 0;
+        if (groups != 0) {
+            const std::uint32_t in_groups = (groups >> 3) * 15;
+            found = fours_over_threshold(groups, cells, right, left, test) & single & in_groups;
+            single &= ~in_groups;
+        }
+        return single == 0 ? found : found | over_threshold(single, cells, right, left, test);
+    };
+    RowBits bits{};
+    if (candidates[0] != 0) bits[0] = hits(candidates[0], 0);
+    if (candidates[1] != 0) {
+        for (const std::uint16_t*& reference : test.range_reference) ++reference;
+        bits[1] = hits(candidates[1], 1);
     }
-    return in_order(hits);
+    return in_order(bits);
 }
+
+void keep(RowBits& bits, const RowBits& those) {
+    for (std::size_t odd = 0; odd < 2; ++odd) bits[odd] &= those[odd];
+}
+/// Drops the cells of which `drop(d)` holds.
+template <class Drop>
+void drop_if(RowBits& bits, Drop drop) {
+    for (std::size_t odd = 0; odd < 2; ++odd) {
+        for (std::uint32_t rest = bits[odd]; rest != 0;) {
+            const int i = take_first(rest);
+            if (drop(2 * i + static_cast<int>(odd))) bits[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
+        }
+    }
+}
+
+/// Of so many maxima in a row, to compare all cells with the rows beside it costs as much as to look at each.
+constexpr std::uint32_t kManyMaxima = 20;
 
 }  // namespace
 
@@ -529,9 +765,9 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
     const int least = config.reference_cells() - config.rank + 1;
     const bool enough = (config.doppler_reference - 1) * config.spacing >= 14 && least <= 16;
     const auto more = static_cast<std::uint32_t>(std::max(least - 9, 0));
-    const bool regular = config.spacing == 2 && config.doppler_reference >= kUnrolled &&
-                         config.doppler_reference % 2 == 0 && config.range_reference >= kUnrolledRange &&
-                         cfar.threshold() >= 0 && cfar.threshold() <= 0xFFFF;
+    const bool regular = config.spacing == 2 && config.doppler_reference == kUnrolled &&
+                         config.range_reference == kUnrolledRange && cfar.threshold() >= 0 &&
+                         cfar.threshold() <= 0xFFFF;
     for (int r = config.first_range_cell; r < kRangeCells; ++r) {
         const MapRow& row = map.cell[static_cast<std::size_t>(r)];
         RowBits candidates{~std::uint32_t{0}, ~std::uint32_t{0}};
@@ -541,19 +777,17 @@ void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, Ce
             for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] |= compares.high[odd];
         }
         // A few are compared with their neighbours one by one, many by comparing the whole row.
-        const bool compared = !few<6>(candidates[0] | candidates[1]);
-        if (compared) {
-            const RowBits in_row = maxima(row);
-            for (std::size_t odd = 0; odd < 2; ++odd) candidates[odd] &= in_row[odd];
-        }
-        const Neighbours neighbours(map, r);
-        for (std::size_t odd = 0; odd < 2; ++odd) {
-            for (std::uint32_t rest = candidates[odd]; rest != 0;) {
-                const int i = take_first(rest);
-                const int d = 2 * i + static_cast<int>(odd);
-                if ((!compared && !neighbours.tops_its_row(d)) || !neighbours.tops_its_columns(d)) {
-                    candidates[odd] &= ~(std::uint32_t{0x8000'0000} >> i);
-                }
+        if (few<6>(candidates[0] | candidates[1])) {
+            drop_if(candidates, [neighbours = Neighbours(map, r)](int d) {
+                return !neighbours.tops_its_row(d) || !neighbours.tops_its_columns(d);
+            });
+        } else {
+            keep(candidates, maxima(row));
+            if (count_set(candidates[0] | candidates[1]) > kManyMaxima && r > 0 && r + 1 < kRangeCells) {
+                keep(candidates, column_maxima(map, static_cast<std::size_t>(r)));
+            } else {
+                drop_if(candidates,
+                        [neighbours = Neighbours(map, r)](int d) { return !neighbours.tops_its_columns(d); });
             }
         }
         // To lay a row out costs as much as to test two cells without.

@@ -77,9 +77,15 @@ class OsCfar {
     /// only if at least k reference cells are smaller than x - log2 alpha.
     [[nodiscard]] bool detects(const PowerMap& map, int range_cell, int doppler_cell) const;
 
-    /// The k-th smallest reference cell scaled to the mean noise power, log2 Q6.10; not below 0. Some 350
-    /// instructions for up to 20 reference cells, independent of their values; for more, 5 each in 16 rounds.
+    /// The k-th smallest reference cell scaled to the mean noise power, log2 Q6.10; not below 0. Some 280
+    /// instructions for the default window, independent of the cells' values; 50 more for another rank, 80
+    /// for another window with up to 20 reference cells; for more cells, 5 each in 16 rounds.
     [[nodiscard]] std::int32_t noise(const PowerMap& map, int range_cell, int doppler_cell) const;
+
+    /// No cell that detects() finds is less than this over its noise(): log2, Q6.10.
+    [[nodiscard]] std::int32_t least_snr() const {
+        return threshold_ - (noise_offset_ > 0 ? noise_offset_ : 0);
+    }
 
   private:
     CfarConfig config_;
@@ -95,11 +101,13 @@ class OsCfar {
 /// Fast because most cells of noise need no look at their neighbours or reference cells: compares of upper
 /// bytes, four cells in a word, give those that are at least `level`; where enough reference cells are,
 /// counted for 32 cells at once, nothing that is less than the threshold over `level` can be a target. The
-/// few others are compared with their neighbours, and maxima with their reference cells; where a row has more
-/// than one, two reference cells at once.
+/// few others are compared with their neighbours, and maxima with their reference cells; where a row has
+/// many, its cells are compared with the rows beside it two at once, and several maxima share the copy of the
+/// row that lays their reference cells side by side.
 /// `level`: log2 power, Q6.10, rounded down to a quarter octave; best about one octave below the median of
 /// the map. Windows with less than eight reference cells on each side along Doppler do without. Cost: about 8
-/// instructions a cell of noise, at most some 51 (see `toolchains/target_report.py`).
+/// instructions a cell of noise, at most some 40 (see `toolchains/target_report.py`); more for windows other
+/// than eight reference cells on each side along Doppler and two along range, with a spacing of 2.
 void cfar_peaks(const PowerMap& map, const OsCfar& cfar, std::uint16_t level, CellMask& peaks);
 
 }  // namespace dsp

@@ -134,6 +134,9 @@ constexpr std::uint32_t reverse_bits(std::uint32_t a) {
 constexpr std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) + product(lane1(a), lane1(b)) + sum);
 }
+constexpr std::int32_t dot(Pair a, Pair b) {
+    return dot(a, b, 0);
+}
 constexpr std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
     return wrap(product(lane0(a), lane0(b)) - product(lane1(a), lane1(b)) + sum);
 }
@@ -160,6 +163,12 @@ constexpr std::int32_t scale_0(std::int32_t a, Pair b) {
 }
 constexpr std::int32_t scale_1(std::int32_t a, Pair b) {
     return static_cast<std::int32_t>(product(a, lane1(b)) >> 16);
+}
+constexpr std::int32_t scale_add_0(std::int32_t a, Pair b, std::int32_t sum) {
+    return wrap(std::int64_t{scale_0(a, b)} + sum);
+}
+constexpr std::int32_t scale_add_1(std::int32_t a, Pair b, std::int32_t sum) {
+    return wrap(std::int64_t{scale_1(a, b)} + sum);
 }
 constexpr Pair scale_lanes(Pair a, std::int32_t factor_0, std::int32_t factor_1) {
     return pack(scale_0(factor_0, a), scale_1(factor_1, a));
@@ -357,6 +366,10 @@ inline std::uint32_t reverse_bits(std::uint32_t a) {
 inline std::int32_t dot(Pair a, Pair b, std::int32_t sum) {
     return __smlad(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
 }
+/// a0 b0 + a1 b1
+inline std::int32_t dot(Pair a, Pair b) {
+    return __smuad(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b));
+}
 /// sum + a0 b0 - a1 b1
 inline std::int32_t dot_minus(Pair a, Pair b, std::int32_t sum) {
     return __smlsd(static_cast<int16x2_t>(a), static_cast<int16x2_t>(b), sum);
@@ -391,6 +404,17 @@ inline std::int32_t scale_0(std::int32_t a, Pair b) {
 inline std::int32_t scale_1(std::int32_t a, Pair b) {
     std::int32_t result;
     asm("smulwt %0, %1, %2" : "=r"(result) : "r"(a), "r"(b));
+    return result;
+}
+/// The same added to a sum.
+inline std::int32_t scale_add_0(std::int32_t a, Pair b, std::int32_t sum) {
+    std::int32_t result;
+    asm("smlawb %0, %1, %2, %3" : "=r"(result) : "r"(a), "r"(b), "r"(sum));
+    return result;
+}
+inline std::int32_t scale_add_1(std::int32_t a, Pair b, std::int32_t sum) {
+    std::int32_t result;
+    asm("smlawt %0, %1, %2, %3" : "=r"(result) : "r"(a), "r"(b), "r"(sum));
     return result;
 }
 /// Each lane times a factor of its own, the upper 32 of 48 bits, rounded down; of these the lower 16.

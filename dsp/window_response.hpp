@@ -25,21 +25,25 @@ struct WindowResponse {
     static constexpr int kGrid = 11;  ///< guesses 0, 1/16 .. 10/16 cell; for negative ones mirror the cells
     static constexpr int kWeightBits = 12;
 
-    /// Q12, for cells -2..2 around the peak, and a zero: in pairs, as packed products take them.
-    using Weights = std::array<std::int16_t, kTaps + 1>;
-
-    struct Lobe {
-        Weights amplitude;  ///< a
-        Weights offset;     ///< g
+    /// Of one cell, Q12, with the lobe's alternating sign: for s_i with the peak's phase alone taken off.
+    struct Weight {
+        std::int16_t amplitude;  ///< a
+        std::int16_t offset;     ///< g
     };
-    alignas(4) std::array<Lobe, kGrid> lobe;
-    /// log2 of the variance of A (of d times A^2) for noise of power 2^-12 in each cell, Q6.10: of a' C a and
-    /// g' C g.
-    std::array<std::int16_t, kGrid> amplitude_variance;
-    std::array<std::int16_t, kGrid> offset_variance;
-    /// log2 of the power of a cell next to the peak cell (at distance one, the nearer side) over that of the
-    /// peak, by guess -8/16 .. 8/16, Q6.10: places a target where only one neighbour exists.
-    std::array<std::int16_t, kGridPerCell + 1> below;
+    struct Lobe {
+        std::array<Weight, kTaps> weight;  ///< for cells -2..2 around the peak
+        /// log2 of the variance of A (of d times A^2) for noise of power 2^-12 in each cell, Q6.10: of a' C a
+        /// and g' C g.
+        std::int16_t amplitude_variance;
+        std::int16_t offset_variance;
+    };
+    alignas(4) std::array<Lobe, kGrid> lobe;  ///< by guess
+
+    static constexpr int kRatioBits = 7;  ///< a step of one eighth of an octave
+    static constexpr int kRatios = 40;
+    /// Offset of a target towards a cell next to its peak cell, in grid steps, -8..8, by the power of the
+    /// peak cell over that of this neighbour: [i] for a log2 from i to i + 1 steps, the last one for more.
+    std::array<std::int8_t, kRatios> offset_by_ratio;
     /// log2 of the largest power m cells away from the peak cell of a target, over that of the peak cell,
     /// whatever its offset: Q6.10, never positive. The spectrum is cyclic: 63 is 1. With growing m it falls,
     /// but may rise once by one place: none from m on is more than the larger of those at m and m + 1.
@@ -182,8 +186,9 @@ constexpr WindowResponse make_response(const Window& window) {
         for (std::size_t i = 0; i < kTaps; ++i) {
             a[i] = divide_q24(multiply_q24(f11, u[i]) - multiply_q24(f01, v[i]), det);
             g[i] = divide_q24(multiply_q24(f00, v[i]) - multiply_q24(f01, u[i]), det);
-            result.lobe[grid].amplitude[i] = static_cast<std::int16_t>(round_shift(a[i], kDown));
-            result.lobe[grid].offset[i] = static_cast<std::int16_t>(round_shift(g[i], kDown));
+            const int sign = i % 2 == kReach % 2 ? 1 : -1;
+            result.lobe[grid].weight[i] = {static_cast<std::int16_t>(sign * round_shift(a[i], kDown)),
+                                           static_cast<std::int16_t>(sign * round_shift(g[i], kDown))};
         }
         Vector ca{};
         Vector cg{};
@@ -195,13 +200,25 @@ constexpr WindowResponse make_response(const Window& window) {
             return static_cast<std::int16_t>(
                 log2_q10(static_cast<std::uint16_t>(round_shift(variance, kDown))));
         };
-        result.amplitude_variance[grid] = log2(dot(a, ca));
-        result.offset_variance[grid] = log2(dot(g, cg));
+        result.lobe[grid].amplitude_variance = log2(dot(a, ca));
+        result.lobe[grid].offset_variance = log2(dot(g, cg));
     }
-    for (int grid = 0; grid <= WindowResponse::kGridPerCell; ++grid) {
-        const int d = grid - WindowResponse::kGridPerCell / 2;
-        result.below[static_cast<std::size_t>(grid)] = static_cast<std::int16_t>(
-            model.log2_power(-WindowResponse::kGridPerCell - d) - model.log2_power(d));
+    constexpr std::size_t kHalf = WindowResponse::kGridPerCell / 2;
+    std::array<std::int32_t, 2 * kHalf + 1> ratio{};  // by offset + kHalf
+    for (std::size_t i = 0; i < ratio.size(); ++i) {
+        const int offset = static_cast<int>(i) - static_cast<int>(kHalf);
+        ratio[i] = model.log2_power(offset) - model.log2_power(WindowResponse::kGridPerCell - offset);
+    }
+    std::size_t nearest = 2 * kHalf;
+    for (std::size_t i = 0; i < WindowResponse::kRatios; ++i) {
+        const auto twice = static_cast<std::int32_t>(2 * i + 1) << WindowResponse::kRatioBits;
+        // The ratio rises as the offset falls, for a rectangular window down to 0.
+        while (nearest > 0 && ratio[nearest - 1] > ratio[nearest] &&
+               ratio[nearest - 1] + ratio[nearest] < twice) {
+            --nearest;
+        }
+        result.offset_by_ratio[i] =
+            static_cast<std::int8_t>(static_cast<int>(nearest) - static_cast<int>(kHalf));
     }
     for (int m = 2; m <= kWindowLength / 2; ++m) {
         std::int32_t largest = -32 * kLogOne;

@@ -2,8 +2,10 @@
 // spectra.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "dsp/detect.hpp"
 #include "tests/bench/dsp_reference.hpp"
@@ -275,6 +277,37 @@ TEST(ExtractPeaks, KeepsTheStrongestAndCountsTheRest) {
     for (int i = 0; i < list.count; ++i) {
         const auto& d = list.item[static_cast<std::size_t>(i)];
         LONGS_EQUAL(40149 - i, workspace->map.cell[d.range_cell][d.doppler_cell]);
+    }
+}
+
+TEST(ExtractPeaks, AnyNumberOfThemComesStrongestFirst) {
+    const dsp::OsCfar cfar{dsp::CfarConfig{}};
+    for (auto& row : workspace->spectrum.row) row.fill({});
+    workspace->spectrum.row_exponent.fill(0);
+    for (int number = 0; number <= 140; ++number) {
+        for (auto& row : workspace->map.cell) row.fill(9000);
+        dsp::CellMask peaks;
+        std::vector<int> powers;
+        for (int i = 0; i < number; ++i) {
+            const int r = 2 + i / 16 * 3;
+            const int d = i % 16 * 4;
+            const int power = 40'000 + static_cast<int>(random() % 100);  // some are equal
+            workspace->map.cell[static_cast<std::size_t>(r)][static_cast<std::size_t>(d)] =
+                static_cast<std::uint16_t>(power);
+            workspace->spectrum.row[static_cast<std::size_t>(r)][static_cast<std::size_t>(d)] = {0, -700};
+            peaks.set(r, d);
+            powers.push_back(power);
+        }
+        std::ranges::sort(powers, std::greater<>());
+        dsp::extract_peaks(workspace->spectrum, workspace->map, peaks, cfar, WindowKind::hann,
+                           WindowKind::hann, {}, kScale, list);
+        LONGS_EQUAL(std::min(number, dsp::kMaxDetections), list.count);
+        LONGS_EQUAL(number - list.count, list.dropped);
+        for (int i = 0; i < list.count; ++i) {
+            const auto& d = list.item[static_cast<std::size_t>(i)];
+            LONGS_EQUAL(powers[static_cast<std::size_t>(i)],
+                        workspace->map.cell[d.range_cell][d.doppler_cell]);
+        }
     }
 }
 

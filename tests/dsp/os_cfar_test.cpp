@@ -81,6 +81,52 @@ TEST(OsCfar, TheSameDecisionsAsSorting) {
     for (const auto& row : bench::os_cfar_exactness(5)) CHECK_TEXT(row.met(), row.what.c_str());
 }
 
+TEST(OsCfar, TheNoiseLevelIsTheOrderStatisticAtEveryRank) {
+    std::uint32_t state = 17;
+    const auto random = [&state](unsigned below) {
+        state = state * 1664525U + 1013904223U;
+        return (state >> 8) % below;
+    };
+    std::vector<dsp::CfarConfig> shapes(3);  // the default, and others that take other paths
+    shapes[1].doppler_guard = 0;
+    shapes[2].range_reference = 1;
+    for (const unsigned values : {65'536U, 6U}) {
+        for (auto& row : map->cell) {
+            for (auto& cell : row) cell = static_cast<std::uint16_t>(30'000 / values + random(values));
+        }
+        for (dsp::CfarConfig config : shapes) {
+            for (std::int16_t rank = 1; rank <= config.reference_cells(); ++rank) {
+                config.rank = rank;
+                const dsp::OsCfar cfar(config);
+                const int offset = dsp::os_cfar_noise_offset(config.reference_cells(), rank);
+                for (int r = config.first_range_cell; r < 32; ++r) {
+                    for (int d = 0; d < 64; ++d) {
+                        std::vector<int> cells;
+                        for (int i = 0; i < config.doppler_reference; ++i) {
+                            const int distance = config.doppler_guard + 1 + config.spacing * i;
+                            cells.push_back(map->at(r, d + distance));
+                            cells.push_back(map->at(r, d - distance));
+                        }
+                        for (int i = 0; static_cast<int>(cells.size()) < config.reference_cells(); ++i) {
+                            const int distance = config.range_guard + 1 + config.spacing * i;
+                            if (r + distance < 32) cells.push_back(map->at(r + distance, d));
+                            if (static_cast<int>(cells.size()) < config.reference_cells() &&
+                                r - distance >= config.first_range_cell) {
+                                cells.push_back(map->at(r - distance, d));
+                            }
+                        }
+                        std::ranges::sort(cells);
+                        const int selected = cells[static_cast<std::size_t>(rank - 1)];
+                        const int noise = cfar.noise(*map, r, d);
+                        CHECK(noise == std::max(selected + offset, 0));
+                        CHECK(!cfar.detects(*map, r, d) || map->at(r, d) - noise >= cfar.least_snr());
+                    }
+                }
+            }
+        }
+    }
+}
+
 TEST(OsCfar, ConstantAndEmptyMapsGiveNothing) {
     for (const int level : {0, 1, 9000, 65535}) {
         fill(static_cast<std::uint16_t>(level));

@@ -78,6 +78,7 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     lanes(above(a0, b0), above(a1, b1), floored_sub(a, b));
     const auto product = [](std::int64_t x, std::int64_t y) { return x * y; };
     LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1) + sum), dot(a, b, sum));
+    LONGS_EQUAL(wrap32(product(a0, b0) + product(a1, b1)), dot(a, b));
     LONGS_EQUAL(wrap32(product(a0, b0) - product(a1, b1) + sum), dot_minus(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b1) + product(a1, b0) + sum), dot_cross(a, b, sum));
     LONGS_EQUAL(wrap32(product(a0, b1) - product(a1, b0) + sum), dot_cross_minus(a, b, sum));
@@ -87,6 +88,8 @@ void check(int a0, int a1, int b0, int b1, std::int32_t sum) {
     LONGS_EQUAL(wrap32(product(a1, b1) + sum), multiply_11(a, b, sum));
     LONGS_EQUAL((product(sum, b0) - (product(sum, b0) & 0xFFFF)) / 65536, scale_0(sum, b));
     LONGS_EQUAL((product(sum, b1) - (product(sum, b1) & 0xFFFF)) / 65536, scale_1(sum, b));
+    LONGS_EQUAL(wrap32(std::int64_t{scale_0(sum, b)} + a1), scale_add_0(sum, b, a1));
+    LONGS_EQUAL(wrap32(std::int64_t{scale_1(sum, b)} + sum), scale_add_1(sum, b, sum));
     const auto bits = [](std::int64_t v) { return static_cast<std::uint32_t>(v & 0xFFFFFFFF); };
     UNSIGNED_LONGS_EQUAL(bits(product(a0, b0) + sum), multiply_add(bits(a0), bits(b0), bits(sum)));
     const std::int64_t scaled0 = (product(sum, a0) - (product(sum, a0) & 0xFFFF)) / 65536;

@@ -56,12 +56,13 @@ TEST(WindowResponse, WeightsAreTheLeastSquaresSolution) {
             const Eigen::Matrix<double, 2, 5> k = (h.transpose() * u).inverse() * u.transpose();
             for (int i = 0; i < 5; ++i) {
                 const auto tap = static_cast<std::size_t>(i);
-                DOUBLES_EQUAL(k(0, i), r.lobe[grid].amplitude[tap] / 4096.0, 3e-4);
-                DOUBLES_EQUAL(k(1, i), r.lobe[grid].offset[tap] / 4096.0, 3e-4);
+                const double sign = i % 2 == 0 ? 1 : -1;  // the lobe's, from cell to cell
+                DOUBLES_EQUAL(sign * k(0, i), r.lobe[grid].weight[tap].amplitude / 4096.0, 3e-4);
+                DOUBLES_EQUAL(sign * k(1, i), r.lobe[grid].weight[tap].offset / 4096.0, 3e-4);
             }
             const Eigen::Matrix2d variance = k * c * k.transpose();
-            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(0, 0)), r.amplitude_variance[grid], 2);
-            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(1, 1)), r.offset_variance[grid], 2);
+            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(0, 0)), r.lobe[grid].amplitude_variance, 2);
+            DOUBLES_EQUAL(1024 * std::log2(4096 * variance(1, 1)), r.lobe[grid].offset_variance, 2);
         }
     }
 }
@@ -99,11 +100,27 @@ TEST(WindowResponse, SidelobesAreAnUpperBoundAndATightOne) {
     }
 }
 
-TEST(WindowResponse, TheCellBelowTellsTheOffset) {
-    // Hann: |W(-1-d)| / |W(d)| = (1-d)/(2+d).
-    const auto& below = dsp::window_response(dsp::WindowKind::hann).below;
-    for (int i = 0; i <= 16; ++i) {
-        const double d = (i - 8) / 16.0;
-        DOUBLES_EQUAL(2048 * std::log2((1 - d) / (2 + d)), below[static_cast<std::size_t>(i)], 3);
+TEST(WindowResponse, TheRatioToANeighbourTellsTheOffset) {
+    for (std::size_t kind = 0; kind < 4; ++kind) {
+        // log2 of |W(d)|^2 / |W(1-d)|^2 falls as d grows, for a rectangular window from 0 on.
+        const auto ratio = [&](double d) {
+            return 2 * std::log2(
+                           std::abs(response(dsp::kWindows[kind], d) / response(dsp::kWindows[kind], 1 - d)));
+        };
+        for (std::size_t i = 0; i < WindowResponse::kRatios; ++i) {
+            const double middle = (static_cast<double>(i) + 0.5) / 8;
+            double d = 0.5;
+            const double least = kind == 0 ? 0 : -0.5;
+            while (d > least && ratio(d) < middle) d -= 1e-3;
+            // Half a step of the table, and a little for the logarithms' rounding.
+            DOUBLES_EQUAL(d, dsp::kWindowResponses[kind].offset_by_ratio[i] / 16.0, 0.5 / 16 + 0.003);
+        }
+    }
+    // Hann, closed form: |W(d)| / |W(1-d)| = (2-d)/(1+d).
+    const auto& hann = dsp::window_response(dsp::WindowKind::hann).offset_by_ratio;
+    for (int offset = -8; offset <= 8; ++offset) {
+        const double d = offset / 16.0;
+        const double log2_ratio = 2 * std::log2((2 - d) / (1 + d));
+        LONGS_EQUAL(offset, hann[static_cast<std::size_t>(log2_ratio * 8)]);
     }
 }

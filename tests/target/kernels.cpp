@@ -88,17 +88,17 @@ constexpr std::array<Tone, dsp::kMaxDetections> crowded_targets() {
     return tones;
 }
 
-/// The most that OS-CFAR can have to do, as far as we know. Every maximum of its row is compared with the
-/// rows beside it, and if it tops them, with all its reference cells. No two that do are neighbours: here
-/// they are every second cell of every second row. In the rows between, which cannot have any, every second
-/// cell is a maximum of its row and as strong as it may be.
+/// The most that OS-CFAR can have to do, as far as we know. No two maxima of the map are neighbours; each is
+/// compared with all its reference cells. Four in a row that are every second cell share much of it, so here
+/// they are every fourth cell, half of them even and half of them odd, and the rows are shifted by two.
+/// Halfway between them every row has a maximum that is as strong as it may be, but not in its column.
 void make_worst(dsp::PowerMap& map, std::int32_t threshold) {
     for (std::size_t r = 0; r < dsp::kRangeCells; ++r) {
         for (std::size_t d = 0; d < dsp::kDopplerCells; ++d) {
-            const bool peak = r % 2 == 0 && d % 2 == 0;
-            const bool maximum_of_row = r % 2 == 1 && d % 2 == 1;
+            const std::size_t place = (d + 2 * (r % 2) + (d < dsp::kDopplerCells / 2 ? 0 : 3)) % 4;
+            const bool peak = place == 0 && d < dsp::kDopplerCells - 2;  // whose neighbour cell 0 may be
             map.cell[r][d] = static_cast<std::uint16_t>(
-                20'000 + (peak ? threshold + 1 : (maximum_of_row ? threshold : 0)));
+                20'000 + (peak ? threshold + 1 : (place % 2 == 0 ? threshold : 0)));
         }
     }
 }
