@@ -87,9 +87,13 @@ class Gate {
     /// R: the measurement's variances, not below the configured least, and wider for an obscured track.
     [[nodiscard]] Vec2<S> noise(const Measurement<S>& m, bool obscured) const {
         const auto larger = [](S a, S b) { return a > b ? a : b; };
-        const Vec2<S> r(larger(m.variance[0], least_variance_[0]), larger(m.variance[1], least_variance_[1]));
-        if (!obscured) return r;
-        return {r[0] + obscured_variance_[0], r[1] + obscured_variance_[1]};
+        S range = larger(m.variance[0], least_variance_[0]);
+        S rate = larger(m.variance[1], least_variance_[1]);
+        if (obscured) {
+            range += obscured_variance_[0];
+            rate += obscured_variance_[1];
+        }
+        return {range, rate};
     }
 
     /// How far in range and in range rate a measurement of at most these variances can be from a track of
