@@ -5,6 +5,7 @@
 
 #include "dsp/fixed_math.hpp"
 #include "firmware/version.hpp"
+#include "tracking/scratch.hpp"
 
 namespace firmware {
 
@@ -221,17 +222,17 @@ void Radar::finish_cycle() {
 }
 
 void Radar::track_and_warn() {
-    std::array<tracking::Measurement<Real>, dsp::kMaxDetections> measurements;
-    int count = 0;
+    tracking::Scratch<tracking::Measurement<Real>, dsp::kMaxDetections> measurements;
+    using Vec2 = tracking::Vec2<Real>;
+    std::size_t count = 0;
+    Real strongest(0);
     for (const dsp::Detection& d : detections_.view()) {
-        auto& m = measurements[static_cast<std::size_t>(count++)];
-        m.z = {d.range_m, d.range_rate_mps};
-        m.variance = {d.range_variance_m2, d.rate_variance_m2ps2};
-        m.snr_db = d.snr_db;
-        observation_.strongest_snr_cdb = std::max<int>(observation_.strongest_snr_cdb, centi(d.snr_db));
+        measurements.make(count++, Vec2{d.range_m, d.range_rate_mps},
+                          Vec2{d.range_variance_m2, d.rate_variance_m2ps2}, d.snr_db);
+        strongest = std::max(strongest, d.snr_db);
     }
-    const tracking::TrackerReport report =
-        tracker_.step({measurements.data(), static_cast<std::size_t>(count)});
+    observation_.strongest_snr_cdb = std::max<int>(observation_.strongest_snr_cdb, centi(strongest));
+    const tracking::TrackerReport report = tracker_.step({&measurements[0], count});
     counters_.detections_dropped += static_cast<std::uint32_t>(detections_.dropped);
     counters_.tracks_dropped += static_cast<std::uint32_t>(report.dropped_for_capacity);
     observation_.over_capacity =

@@ -9,6 +9,7 @@
 #include "tracking/bits.hpp"
 #include "tracking/kalman.hpp"
 #include "tracking/scalar.hpp"
+#include "tracking/scratch.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
@@ -121,6 +122,11 @@ class Gate {
         return true;
     }
 
+    /// What most measurements are not four times as inaccurate as.
+    [[nodiscard]] Vec2<S> usual_noise(bool obscured) const {
+        return noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, obscured);
+    }
+
     /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`. Of more
     /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess(z)`: ln of the clutter
     /// density at z over config().clutter_density, asked of measurements in the gate only. `range_reach`:
@@ -136,11 +142,21 @@ class Gate {
         row.log_missed = logs.missed;
         if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
         const S folded_reach = range_reach + absolute(config_.alias_range_m) * kMaxFolds;
+        // First those near enough, a short loop that turns most away.
+        Scratch<std::uint8_t, 64> near;
+        std::size_t count = 0;
         for (const std::uint32_t index : Bits(usable)) {
             const Measurement<S>& m = measurements[index];
             if (absolute(m.z[0] - x[0]) > folded_reach) continue;
-            const Vec2<S> nu = innovation(x, m.z);
-            if (absolute(nu[0]) <= range_reach) consider(row, index, m, nu, p, log_excess);
+            if (absolute(innovation(x, m.z)[0]) <= range_reach)
+                near[count++] = static_cast<std::uint8_t>(index);
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            const Measurement<S>& m = measurements[near[i]];
+            S distance2(0);
+            S log_density(0);
+            if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) continue;
+            insert(row, near[i], logs.detected + log_density - log_excess(m.z));
         }
     }
     /// The same with clutter as expected everywhere.
@@ -206,30 +222,20 @@ class Gate {
                 floored_ln(S(1) - detection_probability * gate_probability_)};
     }
 
-    /// Not inlined: the loop around it turns most measurements away.
-    template <class LogExcess>
-    [[gnu::noinline]] void consider(AssociationRow<S>& row, std::uint32_t index, const Measurement<S>& m,
-                                    const Vec2<S>& nu, const Mat2<S>& p, LogExcess& log_excess) const {
-        S distance2(0);
-        S log_density(0);
-        if (!test(nu, p, noise(m, row.obscured), distance2, log_density)) return;
-        const S log_ratio = sensor(row.obscured).detected + log_density - log_excess(m.z);
-        insert(row, {static_cast<std::uint16_t>(index), log_ratio, S(0), S(0)});
-    }
-
-    static void insert(AssociationRow<S>& row, const Candidate<S>& candidate) {
+    static void insert(AssociationRow<S>& row, std::uint16_t measurement, S log_ratio) {
+        std::size_t at = 0;
         if (row.count < kMaxGated) {
-            row.item[static_cast<std::size_t>(row.count++)] = candidate;
-            return;
+            at = static_cast<std::size_t>(row.count++);
+        } else {
+            ++row.dropped;
+            for (std::size_t i = 1; i < kMaxGated; ++i) {
+                if (row.item[i].log_ratio < row.item[at].log_ratio) at = i;
+            }
+            if (log_ratio <= row.item[at].log_ratio) return;
+            for (; at + 1 < kMaxGated; ++at) row.item[at] = row.item[at + 1];
         }
-        ++row.dropped;
-        std::size_t weakest = 0;
-        for (std::size_t i = 1; i < kMaxGated; ++i) {
-            if (row.item[i].log_ratio < row.item[weakest].log_ratio) weakest = i;
-        }
-        if (candidate.log_ratio <= row.item[weakest].log_ratio) return;
-        for (std::size_t i = weakest; i + 1 < kMaxGated; ++i) row.item[i] = row.item[i + 1];
-        row.item[kMaxGated - 1] = candidate;
+        row.item[at].measurement = measurement;
+        row.item[at].log_ratio = log_ratio;
     }
 
     GateConfig<S> config_;

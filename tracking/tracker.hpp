@@ -219,7 +219,7 @@ class Tracker {
     }
 
     void predict();
-    [[nodiscard]] bool obscured(const Track<S>& track) const;
+    [[nodiscard]] std::uint32_t obscured() const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
                                        std::uint64_t usable, S range_variance, TrackerReport& report);
     static std::uint64_t claimed_by(std::span<const AssociationRow<S>> rows);
@@ -229,7 +229,7 @@ class Tracker {
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
     void consider_start(std::size_t from, S range_variance, const Vec2<S>& z, const Vec2<S>& noise,
                         Start& best) const;
-    bool begin_track(const Start& start, const Measurement<S>& m, const Vec2<S>& noise,
+    bool begin_track(const Start& start, const Measurement<S>& m, const Vec2<S>& noise, int& room,
                      TrackerReport& report);
     [[nodiscard]] Mat2<S> start_covariance(const Vec2<S>& noise, const StartMotion& motion) const;
     /// The configured prior, its odds lowered as clutter is denser than expected; not so low as to be
@@ -242,7 +242,7 @@ class Tracker {
         return existence > least ? existence : least;
     }
     Track<S>* weakest(bool confirmed);
-    bool make_room_for_tentative(S snr_db, TrackerReport& report);
+    bool replace_tentative(S snr_db, TrackerReport& report);
     void confirm(TrackerReport& report);
     void merge(TrackerReport& report);
     void remove_lost(TrackerReport& report);
@@ -319,16 +319,28 @@ void Tracker<S>::predict() {
     }
 }
 
-/// Another confirmed track is so near that the two may give one detection.
+/// Confirmed tracks so near another confirmed one that the two may give one detection, as bits.
 template <class S>
-bool Tracker<S>::obscured(const Track<S>& track) const {
-    for (const Track<S>& other : tracks()) {
-        const Vec2<S> d = gate_.innovation(track.x, other.x);
-        if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps &&
-            other.is_confirmed() && other.id != track.id)
-            return true;
+[[gnu::noinline]] std::uint32_t Tracker<S>::obscured() const {
+    Scratch<std::uint8_t, kMaxTracks> confirmed;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        if (track_[i].is_confirmed()) confirmed[count++] = static_cast<std::uint8_t>(i);
     }
-    return false;
+    // Nearly all pairs are farther apart in range than a fold in range rate could explain.
+    const S reach = config_.resolution_range_m + absolute(config_.gate.alias_range_m) * Gate<S>::kMaxFolds;
+    std::uint32_t set = 0;
+    for (std::size_t a = 1; a < count; ++a) {
+        const Vec2<S> x = track_[confirmed[a]].x;
+        for (std::size_t b = 0; b < a; ++b) {
+            const Vec2<S>& other = track_[confirmed[b]].x;
+            if (absolute(x[0] - other[0]) > reach) continue;
+            const Vec2<S> d = gate_.innovation(x, other);
+            if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps)
+                set |= 1U << confirmed[a] | 1U << confirmed[b];
+        }
+    }
+    return set;
 }
 
 /// Gates, associates and updates all confirmed or all tentative tracks. Returns the claimed measurements.
@@ -344,11 +356,12 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         for (std::size_t i = 0; i < measurements.size(); ++i) strength[i] = measurements[i].snr_db;
     }
     std::size_t rows = 0;
+    const std::uint32_t obscured = confirmed ? this->obscured() : 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         const Track<S>& t = track_[i];
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
-        const bool hidden = confirmed && obscured(t);
+        const bool hidden = (obscured >> i & 1) != 0;
         const S rate_reach = gate_.rate_reach(t.covariance, index_.largest_variance(), hidden);
         gate_.fill(
             row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], index_.width(rate_reach)),
@@ -494,10 +507,11 @@ template <class S>
     }
 }
 
-/// A tentative track from a pending measurement and m; false where there is no room for it.
+/// A tentative track from a pending measurement and m; false where there is no place for it. `room`: for how
+/// many more there is without giving up another.
 template <class S>
 [[gnu::noinline]] bool Tracker<S>::begin_track(const Start& start, const Measurement<S>& m,
-                                               const Vec2<S>& noise, TrackerReport& report) {
+                                               const Vec2<S>& noise, int& room, TrackerReport& report) {
     const auto from = static_cast<std::size_t>(start.from);
     const Pending& pending = pending_[from];
     const StartMotion& motion = motion_of(from);
@@ -509,7 +523,12 @@ template <class S>
     track.x[0] += move[0];
     track.x[1] += move[1];
     track.covariance = innovation.posterior();
-    if (!in_field(track) || !make_room_for_tentative(m.snr_db, report)) return false;
+    if (!in_field(track)) return false;
+    if (room > 0) {
+        --room;
+    } else if (!replace_tentative(m.snr_db, report)) {
+        return false;
+    }
     track.id = next_id();
     track.state = TrackState::tentative;
     track.existence = existence_of_start(clutter_.log_excess(m.z));
@@ -557,6 +576,7 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
 
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
+    int room = kMaxTentative - count_of(false);
     int pairs = 0;
     for (const std::uint32_t index : Bits(unclaimed)) {
         if (pairs >= kMaxStartPairs) {
@@ -579,7 +599,7 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
             if (!folded && too_far(off) && too_far(off - motion_of(from).fold_step_m)) continue;
             consider_start(from, range_variance, m.z, noise, best);
         }
-        if (best.from < 0 || !begin_track(best, m, noise, report)) continue;
+        if (best.from < 0 || !begin_track(best, m, noise, room, report)) continue;
         used |= bit(static_cast<std::size_t>(best.from));
         left &= ~bit(index);
     }
@@ -620,8 +640,7 @@ Track<S>* Tracker<S>::weakest(bool confirmed) {
 
 /// With kMaxTentative already, the weakest gives way to a stronger one.
 template <class S>
-bool Tracker<S>::make_room_for_tentative(S snr_db, TrackerReport& report) {
-    if (count_of(false) < kMaxTentative) return true;
+bool Tracker<S>::replace_tentative(S snr_db, TrackerReport& report) {
     ++report.dropped_for_capacity;
     Track<S>* const t = weakest(false);
     if (snr_db <= t->snr_db) return false;
@@ -731,12 +750,11 @@ std::uint8_t Tracker<S>::next_id() {
 template <class S>
 void Tracker<S>::erase_free() {
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+    while (kept < static_cast<std::size_t>(count_) && track_[kept].state != TrackState::free) ++kept;
+    for (std::size_t i = kept; i < static_cast<std::size_t>(count_); ++i) {
         if (track_[i].state == TrackState::free) continue;
-        if (kept != i) {
-            track_[kept] = track_[i];
-            if constexpr (kHasModes) modes_[kept] = modes_[i];
-        }
+        track_[kept] = track_[i];
+        if constexpr (kHasModes) modes_[kept] = modes_[i];
         ++kept;
     }
     count_ = static_cast<int>(kept);
