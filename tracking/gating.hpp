@@ -64,6 +64,7 @@ class Gate {
           obscured_variance_(config.obscured_range_sigma_m * config.obscured_range_sigma_m,
                              config.obscured_rate_sigma_mps * config.obscured_rate_sigma_mps),
           most_change_(config.rate_span_mps > S(0) ? config.rate_span_mps * constant<S>(1, 2) : largest<S>()),
+          most_shift_(absolute(config.alias_range_m) * kMaxFolds),
           gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
           seen_(logs(config.detection_probability)),
           obscured_(logs(config.obscured_detection_probability)) {}
@@ -127,7 +128,8 @@ class Gate {
         return noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, obscured);
     }
 
-    /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`. Of more
+    /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`, none of
+    /// them past the last. Of more
     /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess(z)`: ln of the clutter
     /// density at z over config().clutter_density, asked of measurements in the gate only. `range_reach`:
     /// what is farther away in range need not be looked at closer.
@@ -140,17 +142,16 @@ class Gate {
         row.dropped = 0;
         row.obscured = obscured;
         row.log_missed = logs.missed;
-        if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
-        const S folded_reach = range_reach + absolute(config_.alias_range_m) * kMaxFolds;
+        const S folded_reach = range_reach + most_shift_;
         // First those near enough, a short loop that turns most away.
         Scratch<std::uint8_t, 64> near;
         std::size_t count = 0;
-        for (const std::uint32_t index : Bits(usable)) {
+        for_each_bit(usable, [&](std::uint32_t index) {
             const Measurement<S>& m = measurements[index];
-            if (absolute(m.z[0] - x[0]) > folded_reach) continue;
+            if (absolute(m.z[0] - x[0]) > folded_reach) return;
             if (absolute(innovation(x, m.z)[0]) <= range_reach)
                 near[count++] = static_cast<std::uint8_t>(index);
-        }
+        });
         for (std::size_t i = 0; i < count; ++i) {
             const Measurement<S>& m = measurements[near[i]];
             S distance2(0);
@@ -159,9 +160,10 @@ class Gate {
             insert(row, near[i], logs.detected + log_density - log_excess(m.z));
         }
     }
-    /// The same with clutter as expected everywhere.
+    /// The same with clutter as expected everywhere. Bits in `usable` past the measurements are ignored.
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
               std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured) const {
+        if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
         fill(row, x, p, measurements, usable, obscured, [](const Vec2<S>&) { return S(0); });
     }
 
@@ -195,10 +197,12 @@ class Gate {
     [[nodiscard]] const SensorLogs<S>& sensor(bool obscured) const { return obscured ? obscured_ : seen_; }
 
     [[nodiscard]] const GateConfig<S>& config() const { return config_; }
-
-    static constexpr int kMaxFolds = 3;  ///< that innovation() takes back
+    /// By how much innovation() shifts a range at most, when range rates are folded.
+    [[nodiscard]] S most_shift() const { return most_shift_; }
 
   private:
+    static constexpr int kMaxFolds = 3;  ///< that innovation() takes back
+
     [[nodiscard]] S reach(S p, S variance, S least, S obscured) const {
         return sqrt_above(config_.gate, S(p + ((variance > least ? variance : least) + obscured)));
     }
@@ -242,6 +246,7 @@ class Gate {
     Vec2<S> least_variance_;
     Vec2<S> obscured_variance_;
     S most_change_;  ///< of a range rate, unfolded
+    S most_shift_;
     S gate_probability_;
     SensorLogs<S> seen_;
     SensorLogs<S> obscured_;

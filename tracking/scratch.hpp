@@ -8,8 +8,8 @@
 namespace tracking {
 
 /// N elements, each written before it is read. A std::array of fixed-point numbers is set to zero first,
-/// which costs more than what is done with the few elements that a search touches. Elements that hold a vector
-/// or a matrix are made by make(), others may be assigned to.
+/// which costs more than what is done with the few elements that a search touches. Elements that hold a
+/// vector or a matrix are made by make(), others may be assigned to.
 template <class T, std::size_t N>
 class Scratch {
     static_assert(std::is_trivially_destructible_v<T>, "nobody destroys them");

@@ -221,7 +221,8 @@ class Tracker {
     void predict();
     [[nodiscard]] std::uint32_t obscured() const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
-                                       std::uint64_t usable, S range_variance, TrackerReport& report);
+                                       std::uint64_t usable, const Vec2<S>& largest_variance,
+                                       TrackerReport& report);
     static std::uint64_t claimed_by(std::span<const AssociationRow<S>> rows);
     void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S log_excess,
                          S& existence, std::span<const Measurement<S>> measurements);
@@ -277,22 +278,22 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
         measurements = measurements.first(kMaxMeasurements);
     }
     std::uint64_t free = 0;
-    S range_variance(0);
-    index_.clear();
+    Vec2<S> largest(S(0), S(0));
+    index_.clear(measurements.size());
     for (std::size_t i = 0; i < measurements.size(); ++i) {
         const Measurement<S>& m = measurements[i];
-        if (usable(m)) {
-            free |= bit(i);
-            if (m.variance[0] > range_variance) range_variance = m.variance[0];
-            index_.add(m.z[1], m.variance[1]);
-        } else {
+        if (!usable(m)) {
             ++report.invalid_measurements;
-            index_.add(S(0), S(0));
+            continue;
         }
+        free |= bit(i);
+        if (m.variance[0] > largest[0]) largest[0] = m.variance[0];
+        if (m.variance[1] > largest[1]) largest[1] = m.variance[1];
+        index_.add(i, m.z[1]);
     }
     predict();
-    free &= ~associate_and_update(true, measurements, free, range_variance, report);
-    free &= ~associate_and_update(false, measurements, free, range_variance, report);
+    free &= ~associate_and_update(true, measurements, free, largest, report);
+    free &= ~associate_and_update(false, measurements, free, largest, report);
     remove_lost(report);
     start(measurements, free, report);
     confirm(report);
@@ -328,7 +329,7 @@ template <class S>
         if (track_[i].is_confirmed()) confirmed[count++] = static_cast<std::uint8_t>(i);
     }
     // Nearly all pairs are farther apart in range than a fold in range rate could explain.
-    const S reach = config_.resolution_range_m + absolute(config_.gate.alias_range_m) * Gate<S>::kMaxFolds;
+    const S reach = config_.resolution_range_m + gate_.most_shift();
     std::uint32_t set = 0;
     for (std::size_t a = 1; a < count; ++a) {
         const Vec2<S> x = track_[confirmed[a]].x;
@@ -344,10 +345,10 @@ template <class S>
 }
 
 /// Gates, associates and updates all confirmed or all tentative tracks. Returns the claimed measurements.
-/// `range_variance`: the largest of the measurements.
+/// `largest_variance`: of the measurements, in range and in range rate.
 template <class S>
 std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
-                                               std::uint64_t usable, S range_variance,
+                                               std::uint64_t usable, const Vec2<S>& largest_variance,
                                                TrackerReport& report) {
     std::array<S, kMaxConfirmed> existence;
     std::array<RankInput<S>, kHasExistence ? kMaxConfirmed : 0> rank;
@@ -362,12 +363,12 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
         const bool hidden = (obscured >> i & 1) != 0;
-        const S rate_reach = gate_.rate_reach(t.covariance, index_.largest_variance(), hidden);
+        const S rate_reach = gate_.rate_reach(t.covariance, largest_variance[1], hidden);
         gate_.fill(
             row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], index_.width(rate_reach)),
             hidden,
             [&](const Vec2<S>& z) { return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z); },
-            gate_.range_reach(t.covariance, range_variance, hidden));
+            gate_.range_reach(t.covariance, largest_variance[0], hidden));
         S counted(0);
         if (config_.gate.nonparametric) {
             counted = gate_.log_counted_excess(row, t, measurements);
@@ -545,15 +546,16 @@ template <class S>
 template <class S>
 void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
                        TrackerReport& report) {
-    index_.clear();
     Scratch<S, kMaxMeasurements> expected;  // ranges of the pending measurements by now
-    S pending_variance(0);                  // the largest in range
+    Vec2<S> pending_variance(S(0), S(0));   // the largest
     S pending_rate(0);                      // the largest either way
+    index_.clear(pending_count_);
     for (std::size_t i = 0; i < pending_count_; ++i) {
         const Pending& p = pending_[i];
-        index_.add(p.z[1], p.noise[1]);
+        index_.add(i, p.z[1]);
         expected[i] = p.z[0] + motion_of(i).time_s * p.z[1];
-        if (p.noise[0] > pending_variance) pending_variance = p.noise[0];
+        if (p.noise[0] > pending_variance[0]) pending_variance[0] = p.noise[0];
+        if (p.noise[1] > pending_variance[1]) pending_variance[1] = p.noise[1];
         if (absolute(p.z[1]) > pending_rate) pending_rate = absolute(p.z[1]);
     }
     Vec2<S> variance = gate_.noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, false);  // the largest of this frame
@@ -565,14 +567,14 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
     // Of the oldest pending measurements: the others are nearer.
     const StartMotion& motion = start_motion_[kStartFrames - 1];
     const S gate = config_.gate.gate;
-    const S rate_reach = sqrt_above(gate, S(index_.largest_variance() + motion.noise(1, 1) + variance[1]));
+    const S rate_reach = sqrt_above(gate, S(pending_variance[1] + motion.noise(1, 1) + variance[1]));
     const std::uint32_t width = index_.width(rate_reach);
-    const S moved = motion.noise(0, 0) + motion.time_s * (motion.time_s * index_.largest_variance());
-    const S reach = sqrt_above(gate, S(pending_variance + variance[0] + moved)) + motion.fold_step_m;
+    const S moved = motion.noise(0, 0) + motion.time_s * (motion.time_s * pending_variance[1]);
+    const S reach = sqrt_above(gate, S(pending_variance[0] + variance[0] + moved)) + motion.fold_step_m;
     // Range rates smaller than this are on the same side of a fold as all pending ones within reach; those of
     // the others may make the expected range wrong.
     const S unfolded = config_.gate.rate_span_mps - pending_rate - rate_reach;
-    const S folded_reach = reach + absolute(config_.gate.alias_range_m) * Gate<S>::kMaxFolds;
+    const S folded_reach = reach + gate_.most_shift();
 
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
@@ -590,15 +592,15 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         const bool folded = absolute(m.z[1]) >= unfolded;
         const S most_off = folded ? folded_reach : reach;
         Start best;
-        for (const std::uint32_t from : Bits(index_.near(m.z[1], width) & ~used)) {
+        for_each_bit(index_.near(m.z[1], width) & ~used, [&](std::uint32_t from) {
             ++pairs;
             const S off = absolute(range - expected[from]);
-            if (off > most_off) continue;
+            if (off > most_off) return;
             const S range_variance = own_variance + pending_[from].noise[0];
             const auto too_far = [&](S d) { return product_exceeds(d, d, gate, range_variance); };
-            if (!folded && too_far(off) && too_far(off - motion_of(from).fold_step_m)) continue;
+            if (!folded && too_far(off) && too_far(off - motion_of(from).fold_step_m)) return;
             consider_start(from, range_variance, m.z, noise, best);
-        }
+        });
         if (best.from < 0 || !begin_track(best, m, noise, room, report)) continue;
         used |= bit(static_cast<std::size_t>(best.from));
         left &= ~bit(index);
@@ -691,15 +693,17 @@ void Tracker<S>::merge(TrackerReport& report) {
         const Innovation<S> accuracy(a.covariance, least);
         return accuracy.valid() && accuracy.distance2(d) < limit;
     };
-    index_.clear();
-    S range_variance(0);
-    for (const Track<S>& t : tracks()) {
-        const bool coasting = t.misses >= kCoasting;
-        index_.add(t.x[1], coasting ? S(0) : t.covariance(1, 1));
-        if (!coasting && t.covariance(0, 0) > range_variance) range_variance = t.covariance(0, 0);
+    Vec2<S> variance(S(0), S(0));  // the largest of those that may stay
+    index_.clear(tracks().size());
+    for (std::size_t i = 0; i < tracks().size(); ++i) {
+        const Track<S>& t = track_[i];
+        index_.add(i, t.x[1]);
+        if (t.misses >= kCoasting) continue;
+        if (t.covariance(0, 0) > variance[0]) variance[0] = t.covariance(0, 0);
+        if (t.covariance(1, 1) > variance[1]) variance[1] = t.covariance(1, 1);
     }
-    const S range_reach = sqrt_above(limit, S(range_variance + least[0]));
-    const std::uint32_t width = index_.width(sqrt_above(limit, S(index_.largest_variance() + least[1])));
+    const S range_reach = sqrt_above(limit, S(variance[0] + least[0]));
+    const std::uint32_t width = index_.width(sqrt_above(limit, S(variance[1] + least[1])));
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& b = track_[i];
         bool same = false;
