@@ -29,7 +29,7 @@ struct MotionModel {
 /// x <- F x.
 template <class S>
 Vec2<S> predict_state(const Vec2<S>& x, const MotionModel<S>& model) {
-    return {x[0] + x[1] * model.period_s, x[1]};
+    return {x[0] + weighted(model.period_s, x[1]), x[1]};
 }
 
 /// Q, symmetric.
@@ -48,9 +48,9 @@ ProcessNoise<S> process_noise(const MotionModel<S>& model) {
 template <class S>
 Mat2<S> predict_covariance(const Mat2<S>& p, const MotionModel<S>& model, const ProcessNoise<S>& noise) {
     const S t = model.period_s;
-    const S cross = p(0, 1) + t * p(1, 1);
+    const S cross = p(0, 1) + weighted(t, p(1, 1));
     Mat2<S> out;
-    out(0, 0) = p(0, 0) + t * (p(0, 1) + cross) + noise.range;
+    out(0, 0) = p(0, 0) + weighted(t, S(p(0, 1) + cross)) + noise.range;
     out(0, 1) = out(1, 0) = cross + noise.cross;
     out(1, 1) = p(1, 1) + noise.rate;
     return out;
@@ -239,12 +239,13 @@ class Innovation<dsp::Fixed<F>> {
                    : S::from_raw(inverse_.shifted(sum, 32 - inverse_.zeros));
     }
     [[nodiscard]] S log_density(S distance2) const {
-        constexpr auto kLn2Pi = constant<S>(1'837'877'066'409, 1'000'000'000'000);
+        constexpr auto kLn2PiSquared = constant<S>(3'675'754'133, 1'000'000'000);
         constexpr auto kLn2 = constant<S>(693'147'180'560, 1'000'000'000'000);
-        const int exponent = 63 - 2 * F - inverse_.zeros - 2 * (k0_ + k1_);
+        constexpr std::int32_t kUnscaled = kLn2PiSquared.raw() + (63 - 2 * F) * kLn2.raw();
+        const int scale = inverse_.zeros + 2 * (k0_ + k1_);
         const auto log_mantissa = S::from_raw(dsp::detail::ln_of_mantissa(inverse_.mantissa) >> (30 - F));
-        const S sum = distance2 + S::from_raw(exponent * kLn2.raw()) + log_mantissa;
-        return S::from_raw(-(sum.raw() >> 1)) - kLn2Pi;
+        const S sum = distance2 + S::from_raw(kUnscaled - scale * kLn2.raw()) + log_mantissa;
+        return S::from_raw(-(sum.raw() >> 1));
     }
     [[nodiscard]] Vec2<S> move(const Vec2<S>& nu) const {
         const auto v = inverse_.solve(nu[0].raw() << (k0_ + 1), nu[1].raw() << (k1_ + 1));

@@ -180,7 +180,7 @@ class Mixture<dsp::Fixed<F>> {
         cross_squared_ = dsp::product(scaled_cross_, scaled_cross_);
     }
     /// Everything in the coarser scale that these sums need.
-    [[gnu::noinline]] void make_room(S sum0, S sum1) {
+    [[gnu::always_inline]] void make_room(S sum0, S sum1) {
         const int less0 = k0_ - std::min(k0_, detail::scale_of(sum0));
         const int less1 = k1_ - std::min(k1_, detail::scale_of(sum1));
         set_scale(k0_ - less0, k1_ - less1);

@@ -315,7 +315,7 @@ void Tracker<S>::predict() {
             t.x = predict_state(t.x, config_.motion);
             t.covariance = predict_covariance(t.covariance, config_.motion, noise);
         }
-        t.existence *= config_.survival;
+        t.existence = weighted(config_.survival, t.existence);
         if (t.age < 0xFFFF) ++t.age;
     }
 }
@@ -462,7 +462,7 @@ void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
     for (const Candidate<S>& c : row.candidates()) {
         if (main == nullptr || c.weight > main->weight) main = &c;
     }
-    track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 8);
+    track.snr_db += weighted(constant<S>(1, 8), S(measurements[main->measurement].snr_db - track.snr_db));
 }
 
 /// Covariance after the motion of a state known as well as a measurement.
@@ -550,10 +550,12 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
     Vec2<S> pending_variance(S(0), S(0));   // the largest
     S pending_rate(0);                      // the largest either way
     index_.clear(pending_count_);
+    S time_s = start_motion_[1].time_s;
     for (std::size_t i = 0; i < pending_count_; ++i) {
+        if (i == old_pending_count_) time_s = start_motion_[0].time_s;
         const Pending& p = pending_[i];
         index_.add(i, p.z[1]);
-        expected[i] = p.z[0] + motion_of(i).time_s * p.z[1];
+        expected[i] = p.z[0] + time_s * p.z[1];
         if (p.noise[0] > pending_variance[0]) pending_variance[0] = p.noise[0];
         if (p.noise[1] > pending_variance[1]) pending_variance[1] = p.noise[1];
         if (absolute(p.z[1]) > pending_rate) pending_rate = absolute(p.z[1]);
@@ -616,8 +618,8 @@ void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uin
     clutter_.forget();
     const auto room = kMaxMeasurements - static_cast<std::size_t>(std::popcount(unclaimed));
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < pending_count_; ++i) {
-        if ((used & bit(i)) != 0) continue;
+    const std::uint64_t all = pending_count_ == 0 ? 0 : ~std::uint64_t{0} >> (64 - pending_count_);
+    for (const std::uint32_t i : Bits(all & ~used)) {
         if (i < old_pending_count_ || kept >= room) {
             clutter_.add(pending_[i].z);
         } else {
