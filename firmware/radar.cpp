@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "dsp/fixed_math.hpp"
 #include "firmware/version.hpp"
@@ -20,6 +21,16 @@ std::int32_t centi(Real v) {
 }
 std::int32_t milli(Real v) {
     return v.in_units(1000);
+}
+/// The standard deviation in thousandths, within 1 + 2^-15 of it: all that is sent of it.
+std::uint32_t sigma_milli(Real variance) {
+    static_assert(Real::fraction_bits % 2 == 0);
+    if (variance.raw() <= 0) return 0;
+    const auto raw = static_cast<std::uint32_t>(variance.raw());
+    const int up = std::countl_zero(raw) & ~1;
+    const std::uint32_t root = dsp::detail::root_of_upper(raw << up);  // 16 bits
+    const int down = (Real::fraction_bits + up) / 2;
+    return (root * 1000 + (1U << down >> 1)) >> down;
 }
 
 }  // namespace
@@ -310,8 +321,8 @@ can::Object Radar::object_of(const tracking::Track<Real>& track, tracking::Motio
     object.range_rate_mmps = milli(track.x[1]);
     object.motion = static_cast<can::Motion>(motion);
     object.coasting = !track.measured;
-    object.range_sigma_mm = static_cast<std::uint32_t>(milli(dsp::sqrt(track.covariance(0, 0))));
-    object.range_rate_sigma_mmps = static_cast<std::uint32_t>(milli(dsp::sqrt(track.covariance(1, 1))));
+    object.range_sigma_mm = sigma_milli(track.covariance(0, 0));
+    object.range_rate_sigma_mmps = sigma_milli(track.covariance(1, 1));
     object.existence_percent = static_cast<std::uint8_t>(track.existence.in_units(100));
     object.snr_cdb = centi(track.snr_db);
     object.age_cycles = track.age;

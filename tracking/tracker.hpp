@@ -729,12 +729,13 @@ void Tracker<S>::merge(TrackerReport& report) {
 
 template <class S>
 void Tracker<S>::remove_lost(TrackerReport& report) {
+    const S most = config_.max_range_sigma_m * config_.max_range_sigma_m;
     for (Track<S>& t : live()) {
         if (!in_field(t)) {
             t.state = TrackState::free;
             ++report.left;
         } else if (t.existence < config_.delete_existence || t.misses > config_.max_misses ||
-                   t.covariance(0, 0) > config_.max_range_sigma_m * config_.max_range_sigma_m) {
+                   t.covariance(0, 0) > most) {
             t.state = TrackState::free;
             ++report.deleted;
         }
