@@ -16,6 +16,7 @@
 #include "tracking/associator.hpp"
 #include "tracking/bits.hpp"
 #include "tracking/clutter_map.hpp"
+#include "tracking/existence.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/imm_pdaf.hpp"
 #include "tracking/kalman.hpp"
@@ -236,9 +237,7 @@ class Tracker {
     /// The configured prior, its odds lowered as clutter is denser than expected; not so low as to be
     /// deleted.
     [[nodiscard]] S existence_of_start(S log_excess) const {
-        const S odds =
-            config_.initial_existence * reciprocal(S(S(1) - config_.initial_existence)) * exp(-log_excess);
-        const S existence = odds * reciprocal(S(S(1) + odds));
+        const S existence = updated_existence(config_.initial_existence, S(-log_excess));
         const S least = config_.delete_existence * 2;
         return existence > least ? existence : least;
     }
