@@ -197,10 +197,12 @@ struct ScaledInverse {
     bool valid = false;
 };
 
-/// By how many bits each coordinate of a variance can be scaled up in 31 bits.
+/// By how many bits the coordinate of a variance can be scaled up so that the variance has room in 31 bits;
+/// anything in 0..15 for a negative one.
 template <int F>
 int scale_of(dsp::Fixed<F> variance) {
-    return (std::countl_zero(static_cast<std::uint32_t>(variance.raw())) - 1) >> 1;
+    const int zeros = std::countl_zero(static_cast<std::uint32_t>(variance.raw())) - 1;
+    return static_cast<int>(static_cast<std::uint32_t>(zeros) >> 1 & 15U);
 }
 
 }  // namespace detail

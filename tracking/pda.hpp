@@ -48,7 +48,7 @@ void pda(std::span<AssociationRow<S>> rows) {
 template <class S>
 class Mixture {
   public:
-    /// `usual_noise`: most measurements are less than 4 times as inaccurate.
+    /// `usual_noise`: about the variances of most measurements. Others are welcome, at some cost.
     Mixture(const Mat2<S>& p, const Vec2<S>& /*usual_noise*/) : p_(p) {}
 
     /// nu as for Innovation.
@@ -73,9 +73,9 @@ class Mixture {
 };
 
 /// In fixed point scaled as Innovation is, but alike for all measurements, so that nothing need be rounded to
-/// the format before the end. Errors of mean and covariance: 4 LSB and, as long as no measurement is 100
-/// times as inaccurate as another, a relative 2^-18 / (1 - correlation^2) of R, of the moves and of their
-/// squares.
+/// the format before the end. P, given the other coordinate, is at least 2^-28 of S, so that R S^-1 is
+/// below 1. Errors of mean and covariance: 4 LSB and, as long as no measurement is 100 times as inaccurate as
+/// another, a relative 2^-18 / (1 - correlation^2) of R, of the moves and of their squares.
 template <int F>
 class Mixture<dsp::Fixed<F>> {
     using S = dsp::Fixed<F>;
@@ -118,7 +118,7 @@ class Mixture<dsp::Fixed<F>> {
             off1_ += part_of(weight, move1) - part1;
         }
 
-        // The posterior is R - R S^-1 R.
+        // The posterior is R - R S^-1 R; the diagonal of R S^-1 with 31 fraction bits.
         const std::int32_t kept00 = dsp::detail::high_product(r0, inverse.i00) << (inverse.zeros + 1);
         const std::int32_t kept11 = dsp::detail::high_product(r1, inverse.i11) << (inverse.zeros + 1);
         const std::int32_t kept01 = dsp::detail::high_product(r0, inverse.i01);
