@@ -73,9 +73,9 @@ class Mixture {
 };
 
 /// In fixed point scaled as Innovation is, but alike for all measurements, so that nothing need be rounded to
-/// the format before the end. P, given the other coordinate, is at least 2^-28 of S, so that R S^-1 is
-/// below 1. Errors of mean and covariance: 4 LSB and, as long as no measurement is 100 times as inaccurate as
-/// another, a relative 2^-18 / (1 - correlation^2) of R, of the moves and of their squares.
+/// the format before the end. Errors of mean and covariance: 4 LSB and, as long as no measurement is 100
+/// times as inaccurate as another, a relative 2^-18 / (1 - correlation^2) of R, of the moves and of their
+/// squares. The covariance is positive definite whatever R.
 template <int F>
 class Mixture<dsp::Fixed<F>> {
     using S = dsp::Fixed<F>;
@@ -118,12 +118,10 @@ class Mixture<dsp::Fixed<F>> {
             off1_ += part_of(weight, move1) - part1;
         }
 
-        // The posterior is R - R S^-1 R; the diagonal of R S^-1 with 31 fraction bits.
-        const std::int32_t kept00 = dsp::detail::high_product(r0, inverse.i00) << (inverse.zeros + 1);
-        const std::int32_t kept11 = dsp::detail::high_product(r1, inverse.i11) << (inverse.zeros + 1);
+        // The posterior is R - R S^-1 R.
         const std::int32_t kept01 = dsp::detail::high_product(r0, inverse.i01);
-        const std::int32_t posterior00 = r0 - 2 * dsp::detail::high_product(r0, kept00);
-        const std::int32_t posterior11 = r1 - 2 * dsp::detail::high_product(r1, kept11);
+        const std::int32_t posterior00 = posterior(r0, inverse.i00, inverse.zeros);
+        const std::int32_t posterior11 = posterior(r1, inverse.i11, inverse.zeros);
         const std::int32_t minus01 = dsp::detail::high_product(kept01, r1) << (inverse.zeros + 2);
         second00_ = dsp::accumulated(dsp::accumulated(second00_, beta.raw(), posterior00), part0, move0);
         second01_ = dsp::accumulated(dsp::accumulated(second01_, beta.raw(), -minus01), part0, move1);
@@ -141,20 +139,34 @@ class Mixture<dsp::Fixed<F>> {
             return dsp::accumulated(dsp::accumulated(second - dsp::product(a, b), predicted, p), off_a,
                                     off_b);
         };
-        const auto positive = [](std::int32_t v) { return S::from_raw(v > 0 ? v : 1); };
-        Mat2<S> out;
-        out(0, 0) =
+        const auto positive = [](std::int32_t v) { return v > 0 ? v : 1; };
+        const std::int32_t v00 =
             positive(unscaled(about_mean(second00_, scaled0_, first0_, first0_, off0_, off0_), F + 2 * k0_));
-        out(1, 1) =
+        const std::int32_t v11 =
             positive(unscaled(about_mean(second11_, scaled1_, first1_, first1_, off1_, off1_), F + 2 * k1_));
-        out(0, 1) = out(1, 0) = S::from_raw(
-            unscaled(about_mean(second01_, scaled_cross_, first0_, first1_, off0_, off1_), F + k0_ + k1_));
+        std::int32_t v01 =
+            unscaled(about_mean(second01_, scaled_cross_, first0_, first1_, off0_, off1_), F + k0_ + k1_);
+        // Where R leaves P next to no digits, rounding could make it anything.
+        if (dsp::product(v01, v01) >= dsp::product(v00, v11)) [[unlikely]]
+            v01 = 0;
+        Mat2<S> out;
+        out(0, 0) = S::from_raw(v00);
+        out(1, 1) = S::from_raw(v11);
+        out(0, 1) = out(1, 0) = S::from_raw(v01);
         return out;
     }
 
   private:
     static constexpr int kMostZeros = 28;  ///< of the determinant, which is at least 2^52 without correlation
 
+    /// On the diagonal: r - r i r. The share r i is kept without a sign, as rounding may make it 1.
+    static std::int32_t posterior(std::int32_t variance, std::int32_t inverse, int zeros) {
+        const int up = zeros + 1;  // to 31 fraction bits
+        const auto share = static_cast<std::uint32_t>(dsp::detail::high_product(variance, inverse) << up);
+        const auto unsigned_variance = static_cast<std::uint32_t>(variance);
+        return static_cast<std::int32_t>(unsigned_variance -
+                                         2 * dsp::detail::high_product(unsigned_variance, share));
+    }
     static std::int32_t part_of(S share, std::int32_t move) {
         return static_cast<std::int32_t>(dsp::product(share.raw(), move) >> F);
     }
