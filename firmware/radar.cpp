@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "dsp/fixed_math.hpp"
 #include "firmware/version.hpp"
+#include "tracking/scratch.hpp"
 
 namespace firmware {
 
@@ -19,6 +21,16 @@ std::int32_t centi(Real v) {
 }
 std::int32_t milli(Real v) {
     return v.in_units(1000);
+}
+/// The standard deviation in thousandths, within 1 + 2^-15 of it: all that is sent of it.
+std::uint32_t sigma_milli(Real variance) {
+    static_assert(Real::fraction_bits % 2 == 0);
+    if (variance.raw() <= 0) return 0;
+    const auto raw = static_cast<std::uint32_t>(variance.raw());
+    const int up = std::countl_zero(raw) & ~1;
+    const std::uint32_t root = dsp::detail::root_of_upper(raw << up);  // 16 bits
+    const int down = (Real::fraction_bits + up) / 2;
+    return (root * 1000 + (1U << down >> 1)) >> down;
 }
 
 }  // namespace
@@ -221,17 +233,17 @@ void Radar::finish_cycle() {
 }
 
 void Radar::track_and_warn() {
-    std::array<tracking::Measurement<Real>, dsp::kMaxDetections> measurements;
-    int count = 0;
+    tracking::Scratch<tracking::Measurement<Real>, dsp::kMaxDetections> measurements;
+    using Vec2 = tracking::Vec2<Real>;
+    std::size_t count = 0;
+    Real strongest(0);
     for (const dsp::Detection& d : detections_.view()) {
-        auto& m = measurements[static_cast<std::size_t>(count++)];
-        m.z = {d.range_m, d.range_rate_mps};
-        m.variance = {d.range_variance_m2, d.rate_variance_m2ps2};
-        m.snr_db = d.snr_db;
-        observation_.strongest_snr_cdb = std::max<int>(observation_.strongest_snr_cdb, centi(d.snr_db));
+        measurements.make(count++, Vec2{d.range_m, d.range_rate_mps},
+                          Vec2{d.range_variance_m2, d.rate_variance_m2ps2}, d.snr_db);
+        strongest = std::max(strongest, d.snr_db);
     }
-    const tracking::TrackerReport report =
-        tracker_.step({measurements.data(), static_cast<std::size_t>(count)});
+    observation_.strongest_snr_cdb = std::max<int>(observation_.strongest_snr_cdb, centi(strongest));
+    const tracking::TrackerReport report = tracker_.step({&measurements[0], count});
     counters_.detections_dropped += static_cast<std::uint32_t>(detections_.dropped);
     counters_.tracks_dropped += static_cast<std::uint32_t>(report.dropped_for_capacity);
     observation_.over_capacity =
@@ -309,8 +321,8 @@ can::Object Radar::object_of(const tracking::Track<Real>& track, tracking::Motio
     object.range_rate_mmps = milli(track.x[1]);
     object.motion = static_cast<can::Motion>(motion);
     object.coasting = !track.measured;
-    object.range_sigma_mm = static_cast<std::uint32_t>(milli(dsp::sqrt(track.covariance(0, 0))));
-    object.range_rate_sigma_mmps = static_cast<std::uint32_t>(milli(dsp::sqrt(track.covariance(1, 1))));
+    object.range_sigma_mm = sigma_milli(track.covariance(0, 0));
+    object.range_rate_sigma_mmps = sigma_milli(track.covariance(1, 1));
     object.existence_percent = static_cast<std::uint8_t>(track.existence.in_units(100));
     object.snr_cdb = centi(track.snr_db);
     object.age_cycles = track.age;

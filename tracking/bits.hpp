@@ -45,4 +45,16 @@ class Bits {
     std::uint64_t set_;
 };
 
+/// f(member) for every member of a set, ascending; half the loop of Bits. Where the body is short and the set
+/// large.
+template <class F>
+constexpr void for_each_bit(std::uint64_t set, F f) {
+    auto left = static_cast<std::uint32_t>(set);
+    for (std::uint32_t base = 0;; base = 32) {
+        for (; left != 0; left &= left - 1) f(static_cast<std::uint32_t>(std::countr_zero(left)) + base);
+        if (base != 0) return;
+        left = static_cast<std::uint32_t>(set >> 32);
+    }
+}
+
 }  // namespace tracking

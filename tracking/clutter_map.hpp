@@ -63,14 +63,11 @@ class ClutterMap {
     static constexpr int kMemory = 64;
     static constexpr int kMeanBits = 12;  ///< of the fraction of a mean, which saturates at 16 a frame
 
+    /// What is off the map, however far, counts at its edge.
     [[nodiscard]] std::size_t cell(const Vec2<S>& z) const {
-        // Limited before the conversion: what is off the map, however far, counts at its edge.
-        const auto index = [](S v, int count) {
-            const S last(count - 1);
-            return static_cast<std::size_t>(floor_to_int(v < S(0) ? S(0) : (v > last ? last : v)));
-        };
-        return index(z[0] * constant<S>(1, kBandM), kBands) * kRates +
-               index((z[1] + half_span_) * per_rate_, kRates);
+        const int band = floor_of_product(z[0], constant<S>(1, kBandM), kBands - 1);
+        const int rate = floor_of_product(S(z[1] + half_span_), per_rate_, kRates - 1);
+        return static_cast<std::size_t>(band * kRates + rate);
     }
 
     S half_span_;

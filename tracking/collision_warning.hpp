@@ -113,9 +113,14 @@ class CollisionWarning {
     };
     static constexpr int kLimit = 100;  // s and m/s^2
 
-    Memory recall(std::uint8_t id) const {
-        for (const Memory& m : memory_) {
-            if (m.id == id) return m;
+    /// Looked for from `next` on, round: tracks keep their order, so each is found where the last one's
+    /// search ended.
+    Memory recall(std::uint8_t id, std::size_t& next) const {
+        for (std::size_t i = 0; i < memory_.size(); ++i) {
+            const Memory& m = memory_[(next + i) % memory_.size()];
+            if (m.id != id) continue;
+            next += i + 1;
+            return m;
         }
         return {id};
     }
@@ -137,13 +142,14 @@ CollisionWarningResult<S> CollisionWarning<S>::step(std::span<const Track<S>> tr
     CollisionWarningResult<S> result;
     std::array<Memory, kMaxConfirmed> memory{};
     std::size_t remembered = 0;
+    std::size_t next = 0;
     WarningLevel wanted = WarningLevel::none;  // by the thresholds
     WarningLevel kept = WarningLevel::none;    // by the thresholds relaxed by the hysteresis
     for (std::size_t i = 0; i < tracks.size() && i < result.motion.size(); ++i) {
         const Track<S>& t = tracks[i];
         if (!t.is_confirmed() || remembered == memory.size()) continue;
         Memory& m = memory[remembered++];
-        m = recall(t.id);
+        m = recall(t.id, next);
         classify(m, t.x[1], ego);
         result.motion[i] = m.motion;
 

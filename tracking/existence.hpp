@@ -77,8 +77,8 @@ ObservableExistence<S> update_observable(const ObservableExistence<S>& predicted
 template <class S>
 S updated_existence(S psi, S log_evidence) {
     const S doubt = S(1) - psi;
-    const S part = log_evidence > S(0) ? psi : psi * exp(log_evidence);
-    const S whole = part + (log_evidence > S(0) ? doubt * exp(-log_evidence) : doubt);
+    const S part = log_evidence > S(0) ? psi : weighted(psi, exp(log_evidence));
+    const S whole = part + (log_evidence > S(0) ? weighted(doubt, exp(-log_evidence)) : doubt);
     return whole > S(0) ? share(part, reciprocal(whole)) : S(0);
 }
 

@@ -9,6 +9,7 @@
 #include "tracking/bits.hpp"
 #include "tracking/kalman.hpp"
 #include "tracking/scalar.hpp"
+#include "tracking/scratch.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
@@ -63,6 +64,7 @@ class Gate {
           obscured_variance_(config.obscured_range_sigma_m * config.obscured_range_sigma_m,
                              config.obscured_rate_sigma_mps * config.obscured_rate_sigma_mps),
           most_change_(config.rate_span_mps > S(0) ? config.rate_span_mps * constant<S>(1, 2) : largest<S>()),
+          most_shift_(absolute(config.alias_range_m) * kMaxFolds),
           gate_probability_(S(1) - exp(config.gate * constant<S>(-1, 2))),
           seen_(logs(config.detection_probability)),
           obscured_(logs(config.obscured_detection_probability)) {}
@@ -87,9 +89,13 @@ class Gate {
     /// R: the measurement's variances, not below the configured least, and wider for an obscured track.
     [[nodiscard]] Vec2<S> noise(const Measurement<S>& m, bool obscured) const {
         const auto larger = [](S a, S b) { return a > b ? a : b; };
-        const Vec2<S> r(larger(m.variance[0], least_variance_[0]), larger(m.variance[1], least_variance_[1]));
-        if (!obscured) return r;
-        return {r[0] + obscured_variance_[0], r[1] + obscured_variance_[1]};
+        S range = larger(m.variance[0], least_variance_[0]);
+        S rate = larger(m.variance[1], least_variance_[1]);
+        if (obscured) {
+            range += obscured_variance_[0];
+            rate += obscured_variance_[1];
+        }
+        return {range, rate};
     }
 
     /// How far in range and in range rate a measurement of at most these variances can be from a track of
@@ -117,7 +123,13 @@ class Gate {
         return true;
     }
 
-    /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`. Of more
+    /// What most measurements are not four times as inaccurate as.
+    [[nodiscard]] Vec2<S> usual_noise(bool obscured) const {
+        return noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, obscured);
+    }
+
+    /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`, none of
+    /// them past the last. Of more
     /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess(z)`: ln of the clutter
     /// density at z over config().clutter_density, asked of measurements in the gate only. `range_reach`:
     /// what is farther away in range need not be looked at closer.
@@ -130,18 +142,28 @@ class Gate {
         row.dropped = 0;
         row.obscured = obscured;
         row.log_missed = logs.missed;
-        if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
-        const S folded_reach = range_reach + absolute(config_.alias_range_m) * kMaxFolds;
-        for (const std::uint32_t index : Bits(usable)) {
+        const S folded_reach = range_reach + most_shift_;
+        // First those near enough, a short loop that turns most away.
+        Scratch<std::uint8_t, 64> near;
+        std::size_t count = 0;
+        for_each_bit(usable, [&](std::uint32_t index) {
             const Measurement<S>& m = measurements[index];
-            if (absolute(m.z[0] - x[0]) > folded_reach) continue;
-            const Vec2<S> nu = innovation(x, m.z);
-            if (absolute(nu[0]) <= range_reach) consider(row, index, m, nu, p, log_excess);
+            if (absolute(m.z[0] - x[0]) > folded_reach) return;
+            if (absolute(innovation(x, m.z)[0]) <= range_reach)
+                near[count++] = static_cast<std::uint8_t>(index);
+        });
+        for (std::size_t i = 0; i < count; ++i) {
+            const Measurement<S>& m = measurements[near[i]];
+            S distance2(0);
+            S log_density(0);
+            if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) continue;
+            insert(row, near[i], logs.detected + log_density - log_excess(m.z));
         }
     }
-    /// The same with clutter as expected everywhere.
+    /// The same with clutter as expected everywhere. Bits in `usable` past the measurements are ignored.
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
               std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured) const {
+        if (measurements.size() < 64) usable &= (std::uint64_t{1} << measurements.size()) - 1;
         fill(row, x, p, measurements, usable, obscured, [](const Vec2<S>&) { return S(0); });
     }
 
@@ -175,10 +197,12 @@ class Gate {
     [[nodiscard]] const SensorLogs<S>& sensor(bool obscured) const { return obscured ? obscured_ : seen_; }
 
     [[nodiscard]] const GateConfig<S>& config() const { return config_; }
-
-    static constexpr int kMaxFolds = 3;  ///< that innovation() takes back
+    /// By how much innovation() shifts a range at most, when range rates are folded.
+    [[nodiscard]] S most_shift() const { return most_shift_; }
 
   private:
+    static constexpr int kMaxFolds = 3;  ///< that innovation() takes back
+
     [[nodiscard]] S reach(S p, S variance, S least, S obscured) const {
         return sqrt_above(config_.gate, S(p + ((variance > least ? variance : least) + obscured)));
     }
@@ -202,36 +226,27 @@ class Gate {
                 floored_ln(S(1) - detection_probability * gate_probability_)};
     }
 
-    /// Not inlined: the loop around it turns most measurements away.
-    template <class LogExcess>
-    [[gnu::noinline]] void consider(AssociationRow<S>& row, std::uint32_t index, const Measurement<S>& m,
-                                    const Vec2<S>& nu, const Mat2<S>& p, LogExcess& log_excess) const {
-        S distance2(0);
-        S log_density(0);
-        if (!test(nu, p, noise(m, row.obscured), distance2, log_density)) return;
-        const S log_ratio = sensor(row.obscured).detected + log_density - log_excess(m.z);
-        insert(row, {static_cast<std::uint16_t>(index), log_ratio, S(0), S(0)});
-    }
-
-    static void insert(AssociationRow<S>& row, const Candidate<S>& candidate) {
+    static void insert(AssociationRow<S>& row, std::uint16_t measurement, S log_ratio) {
+        std::size_t at = 0;
         if (row.count < kMaxGated) {
-            row.item[static_cast<std::size_t>(row.count++)] = candidate;
-            return;
+            at = static_cast<std::size_t>(row.count++);
+        } else {
+            ++row.dropped;
+            for (std::size_t i = 1; i < kMaxGated; ++i) {
+                if (row.item[i].log_ratio < row.item[at].log_ratio) at = i;
+            }
+            if (log_ratio <= row.item[at].log_ratio) return;
+            for (; at + 1 < kMaxGated; ++at) row.item[at] = row.item[at + 1];
         }
-        ++row.dropped;
-        std::size_t weakest = 0;
-        for (std::size_t i = 1; i < kMaxGated; ++i) {
-            if (row.item[i].log_ratio < row.item[weakest].log_ratio) weakest = i;
-        }
-        if (candidate.log_ratio <= row.item[weakest].log_ratio) return;
-        for (std::size_t i = weakest; i + 1 < kMaxGated; ++i) row.item[i] = row.item[i + 1];
-        row.item[kMaxGated - 1] = candidate;
+        row.item[at].measurement = measurement;
+        row.item[at].log_ratio = log_ratio;
     }
 
     GateConfig<S> config_;
     Vec2<S> least_variance_;
     Vec2<S> obscured_variance_;
     S most_change_;  ///< of a range rate, unfolded
+    S most_shift_;
     S gate_probability_;
     SensorLogs<S> seen_;
     SensorLogs<S> obscured_;

@@ -29,7 +29,7 @@ struct MotionModel {
 /// x <- F x.
 template <class S>
 Vec2<S> predict_state(const Vec2<S>& x, const MotionModel<S>& model) {
-    return {x[0] + x[1] * model.period_s, x[1]};
+    return {x[0] + weighted(model.period_s, x[1]), x[1]};
 }
 
 /// Q, symmetric.
@@ -48,9 +48,9 @@ ProcessNoise<S> process_noise(const MotionModel<S>& model) {
 template <class S>
 Mat2<S> predict_covariance(const Mat2<S>& p, const MotionModel<S>& model, const ProcessNoise<S>& noise) {
     const S t = model.period_s;
-    const S cross = p(0, 1) + t * p(1, 1);
+    const S cross = p(0, 1) + weighted(t, p(1, 1));
     Mat2<S> out;
-    out(0, 0) = p(0, 0) + t * (p(0, 1) + cross) + noise.range;
+    out(0, 0) = p(0, 0) + weighted(t, S(p(0, 1) + cross)) + noise.range;
     out(0, 1) = out(1, 0) = cross + noise.cross;
     out(1, 1) = p(1, 1) + noise.rate;
     return out;
@@ -151,85 +151,36 @@ class Innovation {
     S s0_, s1_, determinant_;
 };
 
-/// In fixed point each coordinate is scaled by a power of two, x'_i = 2^k_i x_i, so that the variances S'_ii
-/// have no more than two leading zeros besides the sign. The determinant is then exact in 64 bits, all that
-/// follows has known places, and one division serves it: S'^-1 = 2^(z - 62 + F) inverse_, z being the leading
-/// zeros of the determinant. Correlations up to 1 - 2^-19 are valid. Errors: distance2 within 2^-18 (1 +
-/// distance2) / (1 - correlation^2); the posterior, of a measurement with variances up to 10, within 2 LSB.
-template <int F>
-class Innovation<dsp::Fixed<F>> {
-    using S = dsp::Fixed<F>;
+namespace detail {
 
-  public:
-    Innovation(const Mat2<S>& p, const Vec2<S>& r)
-        : p0_(p(0, 0).raw()), p1_(p(1, 1).raw()), cross_(p(0, 1).raw()) {
-        const std::int32_t s0 = (p(0, 0) + r[0]).raw();
-        const std::int32_t s1 = (p(1, 1) + r[1]).raw();
-        if (s0 <= 0 || s1 <= 0) return;
-        r0_ = s0 - p0_;  // also where the sum saturates
-        r1_ = s1 - p1_;
-        k0_ = (std::countl_zero(static_cast<std::uint32_t>(s0)) - 1) >> 1;
-        k1_ = (std::countl_zero(static_cast<std::uint32_t>(s1)) - 1) >> 1;
-        const std::int32_t cross = cross_ << (k0_ + k1_);
-        if (cross >> (k0_ + k1_) != cross_) return;
-        const std::int32_t scaled0 = s0 << 2 * k0_;
-        const std::int32_t scaled1 = s1 << 2 * k1_;
-        const std::int64_t determinant = dsp::product(scaled0, scaled1) - dsp::product(cross, cross);
-        if (determinant < std::int64_t{1} << (63 - kMostZeros)) return;
-        zeros_ = std::countl_zero(static_cast<std::uint32_t>(determinant >> 32));
-        mantissa_ = static_cast<std::uint32_t>(shifted(determinant, 32 - zeros_));
-        const auto inverse = static_cast<std::int32_t>(dsp::detail::inverse(mantissa_));
-        inverse00_ = dsp::detail::high_product(scaled1, inverse);
-        inverse01_ = -dsp::detail::high_product(cross, inverse);
-        inverse11_ = dsp::detail::high_product(scaled0, inverse);
-        valid_ = true;
+/// The inverse of a scaled innovation covariance S', whose entries fit 31 bits: S'^-1 = 2^(zeros - 62) times
+/// the numbers here. The determinant is exact in 64 bits, and one division serves all.
+struct ScaledInverse {
+    /// `most_zeros`: leading zeros of the determinant, at most 28; with more there is no inverse.
+    ScaledInverse(std::int32_t s00, std::int32_t s01, std::int32_t s11, std::int64_t s01_squared,
+                  int most_zeros) {
+        const std::int64_t determinant = dsp::product(s00, s11) - s01_squared;
+        const auto high = static_cast<std::int32_t>(determinant >> 32);
+        if (high < 1 << (31 - most_zeros)) return;
+        zeros = std::countl_zero(static_cast<std::uint32_t>(high));
+        mantissa = static_cast<std::uint32_t>(shifted(determinant, 32 - zeros));
+        const auto inverse = static_cast<std::int32_t>(dsp::detail::inverse(mantissa));
+        i00 = dsp::detail::high_product(s11, inverse);
+        i01 = -dsp::detail::high_product(s01, inverse);
+        i11 = dsp::detail::high_product(s00, inverse);
+        valid = true;
     }
 
-    [[nodiscard]] bool valid() const { return valid_; }
-    [[nodiscard]] S distance2(const Vec2<S>& nu) const {
-        const std::int32_t n0 = nu[0].raw() << (k0_ + 1);
-        const std::int32_t n1 = nu[1].raw() << (k1_ + 1);
-        const Solved v = solve(n0, n1);
-        const std::int64_t sum = dot(v.v0, n0, v.v1, n1);
-        return static_cast<std::int32_t>(sum >> 32) >> (31 - zeros_) != 0
-                   ? S::max()
-                   : S::from_raw(shifted(sum, 32 - zeros_));
-    }
-    [[nodiscard]] S log_density(S distance2) const {
-        constexpr auto kLn2Pi = constant<S>(1'837'877'066'409, 1'000'000'000'000);
-        constexpr auto kLn2 = constant<S>(693'147'180'560, 1'000'000'000'000);
-        const int exponent = 63 - zeros_ - 2 * (F + k0_ + k1_);
-        const auto log_mantissa = S::from_raw(dsp::detail::ln_of_mantissa(mantissa_) >> (30 - F));
-        const S sum = distance2 + S::from_raw(exponent * kLn2.raw()) + log_mantissa;
-        return S::from_raw(-(sum.raw() >> 1)) - kLn2Pi;
-    }
-    [[nodiscard]] Vec2<S> move(const Vec2<S>& nu) const {
-        const Solved v = solve(nu[0].raw() << (k0_ + 1), nu[1].raw() << (k1_ + 1));
-        const std::int64_t half = std::int64_t{1} << (30 - zeros_);
-        return {S::from_raw(shifted(half + dot(p0_ << k0_, v.v0, cross_ << k1_, v.v1), 31 - zeros_)),
-                S::from_raw(shifted(half + dot(cross_ << k0_, v.v0, p1_ << k1_, v.v1), 31 - zeros_))};
-    }
-    [[nodiscard]] Mat2<S> posterior() const {
-        // R S^-1 = 1 - K with 30 fraction bits, in the scale of row and column.
-        constexpr std::int32_t kOne = 1 << 30;
-        const std::int32_t gain0 = kOne - shifted(dsp::product(r0_ << 2 * k0_, inverse00_), 32 - zeros_);
-        const std::int32_t gain1 = kOne - shifted(dsp::product(r1_ << 2 * k1_, inverse11_), 32 - zeros_);
-        const std::int32_t kept01 = shifted(dsp::product(r0_ << k0_, inverse01_), 32 - zeros_);
-        const auto positive = [](std::int32_t v) { return S::from_raw(v > 0 ? v : 1); };
-        Mat2<S> out;
-        out(0, 0) = positive(dsp::rounded<30>(dsp::product(r0_, gain0)));
-        out(1, 1) = positive(dsp::rounded<30>(dsp::product(r1_, gain1)));
-        out(0, 1) = out(1, 0) = S::from_raw(-dsp::rounded<30>(dsp::product(kept01, r1_ << k1_)));
-        return out;
-    }
-
-  private:
-    static constexpr int kMostZeros = 20;  ///< of the determinant, which is at least 2^58 without correlation
-
-    /// S'^-1 nu', 2^(z - 31) times.
     struct Solved {
         std::int32_t v0, v1;
     };
+    /// S'^-1 n, 2^(zeros - 30) times, for n within 5 standard deviations of S' in each coordinate, with
+    /// 11 fraction bits. They fit for twice as much.
+    [[nodiscard]] Solved solve(std::int32_t n0, std::int32_t n1) const {
+        return {static_cast<std::int32_t>(dot(i00, n0, i01, n1) >> 32),
+                static_cast<std::int32_t>(dot(i01, n0, i11, n1) >> 32)};
+    }
+
     static std::int64_t dot(std::int32_t a0, std::int32_t b0, std::int32_t a1, std::int32_t b1) {
         return dsp::accumulated(dsp::product(a0, b0), a1, b1);
     }
@@ -239,19 +190,99 @@ class Innovation<dsp::Fixed<F>> {
         return static_cast<std::int32_t>(static_cast<std::uint32_t>(wide) >> bits |
                                          static_cast<std::uint32_t>(wide >> 32) << (32 - bits));
     }
-    /// Of 2 nu', so that the upper halves of the sums are what is wanted; they fit as nu is within 10
-    /// standard deviations.
-    [[nodiscard]] Solved solve(std::int32_t n0, std::int32_t n1) const {
-        return {static_cast<std::int32_t>(dot(inverse00_, n0, inverse01_, n1) >> 32),
-                static_cast<std::int32_t>(dot(inverse01_, n0, inverse11_, n1) >> 32)};
+
+    std::int32_t i00 = 0, i01 = 0, i11 = 0;
+    int zeros = 0;
+    std::uint32_t mantissa = 0;  ///< of the determinant, 2^(32 - zeros) mantissa
+    bool valid = false;
+};
+
+/// By how many bits the coordinate of a variance can be scaled up so that the variance has room in 31 bits;
+/// anything in 0..15 for a negative one.
+template <int F>
+int scale_of(dsp::Fixed<F> variance) {
+    const int zeros = std::countl_zero(static_cast<std::uint32_t>(variance.raw())) - 1;
+    return static_cast<int>(static_cast<std::uint32_t>(zeros) >> 1 & 15U);
+}
+
+}  // namespace detail
+
+/// In fixed point each coordinate is scaled by a power of two, x'_i = 2^k_i x_i, so that the variances S'_ii
+/// have no more than two leading zeros besides the sign; all that follows has known places. Correlations up
+/// to 1 - 2^-19 are valid. Errors: distance2 within 2^-18 (1 + distance2) / (1 - correlation^2); the
+/// posterior, of a measurement with variances up to 10, within 2 LSB.
+template <int F>
+class Innovation<dsp::Fixed<F>> {
+    using S = dsp::Fixed<F>;
+
+  public:
+    Innovation(const Mat2<S>& p, const Vec2<S>& r)
+        : p0_(p(0, 0).raw()),
+          p1_(p(1, 1).raw()),
+          cross_(p(0, 1).raw()),
+          s0_(p(0, 0) + r[0]),
+          s1_(p(1, 1) + r[1]),
+          k0_(detail::scale_of(s0_)),
+          k1_(detail::scale_of(s1_)),
+          scaled_cross_(cross_ << (k0_ + k1_)),
+          inverse_(s0_.raw() << 2 * k0_, scaled_cross_, s1_.raw() << 2 * k1_,
+                   dsp::product(scaled_cross_, scaled_cross_), kMostZeros) {}
+
+    [[nodiscard]] bool valid() const {
+        return inverse_.valid && (s0_.raw() | s1_.raw()) > 0 && scaled_cross_ >> (k0_ + k1_) == cross_;
+    }
+    [[nodiscard]] S distance2(const Vec2<S>& nu) const {
+        const std::int32_t n0 = nu[0].raw() << (k0_ + 1);
+        const std::int32_t n1 = nu[1].raw() << (k1_ + 1);
+        const auto v = inverse_.solve(n0, n1);
+        const std::int64_t sum = inverse_.dot(v.v0, n0, v.v1, n1);
+        return static_cast<std::int32_t>(sum >> 32) >> (31 - inverse_.zeros) != 0
+                   ? S::max()
+                   : S::from_raw(inverse_.shifted(sum, 32 - inverse_.zeros));
+    }
+    [[nodiscard]] S log_density(S distance2) const {
+        constexpr auto kLn2PiSquared = constant<S>(3'675'754'133, 1'000'000'000);
+        constexpr auto kLn2 = constant<S>(693'147'180'560, 1'000'000'000'000);
+        constexpr std::int32_t kUnscaled = kLn2PiSquared.raw() + (63 - 2 * F) * kLn2.raw();
+        const int scale = inverse_.zeros + 2 * (k0_ + k1_);
+        const auto log_mantissa = S::from_raw(dsp::detail::ln_of_mantissa(inverse_.mantissa) >> (30 - F));
+        const S sum = distance2 + S::from_raw(kUnscaled - scale * kLn2.raw()) + log_mantissa;
+        return S::from_raw(-(sum.raw() >> 1));
+    }
+    [[nodiscard]] Vec2<S> move(const Vec2<S>& nu) const {
+        const auto v = inverse_.solve(nu[0].raw() << (k0_ + 1), nu[1].raw() << (k1_ + 1));
+        const std::int64_t half = std::int64_t{1} << (30 - inverse_.zeros);
+        const auto sum = [&](std::int32_t to0, std::int32_t to1) {
+            return S::from_raw(inverse_.shifted(half + inverse_.dot(to0 << k0_, v.v0, to1 << k1_, v.v1),
+                                                31 - inverse_.zeros));
+        };
+        return {sum(p0_, cross_), sum(cross_, p1_)};
+    }
+    [[nodiscard]] Mat2<S> posterior() const {
+        // R S^-1 = 1 - K with 30 fraction bits, in the scale of row and column.
+        constexpr std::int32_t kOne = 1 << 30;
+        const int down = 32 - inverse_.zeros;
+        const std::int32_t r0 = s0_.raw() - p0_;  // also where the sum saturates
+        const std::int32_t r1 = s1_.raw() - p1_;
+        const std::int32_t gain0 = kOne - inverse_.shifted(dsp::product(r0 << 2 * k0_, inverse_.i00), down);
+        const std::int32_t gain1 = kOne - inverse_.shifted(dsp::product(r1 << 2 * k1_, inverse_.i11), down);
+        const std::int32_t kept01 = inverse_.shifted(dsp::product(r0 << k0_, inverse_.i01), down);
+        const auto positive = [](std::int32_t v) { return S::from_raw(v > 0 ? v : 1); };
+        Mat2<S> out;
+        out(0, 0) = positive(dsp::rounded<30>(dsp::product(r0, gain0)));
+        out(1, 1) = positive(dsp::rounded<30>(dsp::product(r1, gain1)));
+        out(0, 1) = out(1, 0) = S::from_raw(-dsp::rounded<30>(dsp::product(kept01, r1 << k1_)));
+        return out;
     }
 
+  private:
+    static constexpr int kMostZeros = 20;  ///< of the determinant, which is at least 2^58 without correlation
+
     std::int32_t p0_, p1_, cross_;
-    std::int32_t r0_ = 0, r1_ = 0;
-    std::int32_t inverse00_ = 0, inverse01_ = 0, inverse11_ = 0;
-    bool valid_ = false;
-    std::uint32_t mantissa_ = 0;  // of the determinant
-    int k0_ = 0, k1_ = 0, zeros_ = 0;
+    S s0_, s1_;
+    int k0_, k1_;
+    std::int32_t scaled_cross_;
+    detail::ScaledInverse inverse_;
 };
 
 }  // namespace tracking

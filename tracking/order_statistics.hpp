@@ -160,6 +160,7 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
         const auto o = static_cast<std::size_t>(owner);
         return S(c.beta * (S(1) - rows[o].item[static_cast<std::size_t>(dominants.candidate[o])].beta));
     };
+    const bool free_stay = config.reduced == Reduced::claimed_by_others;
     for (std::size_t t = 0; t < rows.size(); ++t) {
         AssociationRow<S>& row = rows[t];
         if (row.count == 0) {
@@ -167,16 +168,20 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             continue;
         }
         const bool has_dominant = dominants.candidate[t] != detail::kNobody;
+        bool changed = config.missed == MissedColumn::drop;
         S sum(0);
         for (Candidate<S>& c : row.candidates()) {
             const int owner = dominants.owner[c.measurement];
-            const bool own = owner == static_cast<int>(t);
-            const bool may_stay =
-                own || (owner == detail::kNobody && config.reduced == Reduced::claimed_by_others);
-            c.weight = may_stay ? c.beta : reduced(c, owner, has_dominant);
+            if (owner == static_cast<int>(t) || (owner == detail::kNobody && free_stay)) {
+                c.weight = c.beta;
+            } else {
+                c.weight = reduced(c, owner, has_dominant);
+                changed = true;
+            }
             sum += c.weight;
         }
         row.missed_weight = config.missed == MissedColumn::keep ? row.missed : S(0);
+        if (!changed) continue;  // they sum up to 1 as before
         sum += row.missed_weight;
         if (sum <= S(0)) {
             row.missed_weight = S(1);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -28,18 +29,12 @@ class RateIndex {
         }
     }
 
-    void clear() {
+    /// Makes room for range rates 0 .. count - 1.
+    void clear(std::size_t count) {
         sector_ = {};
-        count_ = 0;
-        largest_variance_ = S(0);
+        count_ = static_cast<std::uint32_t>(count);
     }
-    /// Its number is how many were added before.
-    void add(S rate, S variance) {
-        sector_[angle(rate) >> kSectorBits][count_ / 32] |= 1U << count_ % 32;
-        ++count_;
-        if (variance > largest_variance_) largest_variance_ = variance;
-    }
-    [[nodiscard]] S largest_variance() const { return largest_variance_; }
+    void add(std::size_t i, S rate) { sector_[angle(rate) >> kSectorBits][i / 32] |= 1U << i % 32; }
 
     /// A reach in range rate as near() wants it; the same for all range rates asked about.
     [[nodiscard]] std::uint32_t width(S reach) const {
@@ -61,25 +56,24 @@ class RateIndex {
         if (width == kEverything) return count_ == 0 ? 0 : ~std::uint64_t{0} >> (64 - count_);
         const std::uint32_t middle = angle(rate);
         const std::uint32_t to = (middle + width) >> kSectorBits;
-        std::uint32_t i = (middle - width) >> kSectorBits;
-        Set set{};
-        const auto add_up_to = [&](std::uint32_t end) {
-            for (; i < end; ++i) {
-                set[0] |= sector_[i][0];
-                set[1] |= sector_[i][1];
-            }
+        const std::uint32_t from = (middle - width) >> kSectorBits;
+        std::uint64_t set = 0;
+        const auto add = [&set](const Set* sector, const Set* end) {
+            for (; sector != end; ++sector) set |= std::bit_cast<std::uint64_t>(*sector);
         };
-        if (i > to) {
-            add_up_to(kSectors);
-            i = 0;
+        const Set* const first = sector_.data();
+        if (from > to) {
+            add(first + from, first + kSectors);
+            add(first, first + to + 1);
+        } else {
+            add(first + from, first + to + 1);
         }
-        add_up_to(to + 1);
-        return static_cast<std::uint64_t>(set[1]) << 32 | set[0];
+        return set;
     }
 
   private:
     using Set = std::array<std::uint32_t, 2>;  ///< as bits, by halves
-    static_assert(kMaxMeasurements <= 64);
+    static_assert(kMaxMeasurements <= 64 && std::endian::native == std::endian::little);
     static constexpr int kSectorBits = 26;  ///< of the angle within a sector
     static constexpr std::uint32_t kSectors = 64;
     static constexpr int kScaleBits = 16;
@@ -99,7 +93,6 @@ class RateIndex {
     bool folded_;
     std::conditional_t<std::floating_point<S>, S, std::int32_t> scale_{};  ///< 2^(32 + kScaleBits) for a span
     std::uint32_t count_ = 0;
-    S largest_variance_ = S(0);
     std::array<Set, kSectors> sector_{};
 };
 

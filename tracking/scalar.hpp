@@ -125,6 +125,18 @@ constexpr S weighted(S weight, S x) {
     }
 }
 
+/// The largest integer not above a b, held within 0..last.
+template <class S>
+constexpr int floor_of_product(S a, S b, int last) {
+    if constexpr (std::floating_point<S>) {
+        const S product = a * b;
+        return product < S(last) ? (product > S(0) ? static_cast<int>(product) : 0) : last;
+    } else {
+        const auto floor = static_cast<std::int32_t>(dsp::product(a.raw(), b.raw()) >> 2 * S::fraction_bits);
+        return floor < last ? (floor > 0 ? floor : 0) : last;
+    }
+}
+
 /// A number not below sqrt(a b) for a >= 0, and above it by 7 % or 2^15 + 2 LSB at most: the mean of c and
 /// a b / c for a power of two c of at least 2^16 LSB. 0 if b is negative.
 template <class S>

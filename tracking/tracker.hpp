@@ -16,6 +16,7 @@
 #include "tracking/associator.hpp"
 #include "tracking/bits.hpp"
 #include "tracking/clutter_map.hpp"
+#include "tracking/existence.hpp"
 #include "tracking/gating.hpp"
 #include "tracking/imm_pdaf.hpp"
 #include "tracking/kalman.hpp"
@@ -219,9 +220,10 @@ class Tracker {
     }
 
     void predict();
-    [[nodiscard]] bool obscured(const Track<S>& track) const;
+    [[nodiscard]] std::uint32_t obscured() const;
     std::uint64_t associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
-                                       std::uint64_t usable, S range_variance, TrackerReport& report);
+                                       std::uint64_t usable, const Vec2<S>& largest_variance,
+                                       TrackerReport& report);
     static std::uint64_t claimed_by(std::span<const AssociationRow<S>> rows);
     void associate_modes(ImmState<S, 2, 2>& modes, const Vec2<S>& x, AssociationRow<S>& row, S log_excess,
                          S& existence, std::span<const Measurement<S>> measurements);
@@ -229,20 +231,18 @@ class Tracker {
     void start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed, TrackerReport& report);
     void consider_start(std::size_t from, S range_variance, const Vec2<S>& z, const Vec2<S>& noise,
                         Start& best) const;
-    bool begin_track(const Start& start, const Measurement<S>& m, const Vec2<S>& noise,
+    bool begin_track(const Start& start, const Measurement<S>& m, const Vec2<S>& noise, int& room,
                      TrackerReport& report);
     [[nodiscard]] Mat2<S> start_covariance(const Vec2<S>& noise, const StartMotion& motion) const;
     /// The configured prior, its odds lowered as clutter is denser than expected; not so low as to be
     /// deleted.
     [[nodiscard]] S existence_of_start(S log_excess) const {
-        const S odds =
-            config_.initial_existence * reciprocal(S(S(1) - config_.initial_existence)) * exp(-log_excess);
-        const S existence = odds * reciprocal(S(S(1) + odds));
+        const S existence = updated_existence(config_.initial_existence, S(-log_excess));
         const S least = config_.delete_existence * 2;
         return existence > least ? existence : least;
     }
     Track<S>* weakest(bool confirmed);
-    bool make_room_for_tentative(S snr_db, TrackerReport& report);
+    bool replace_tentative(S snr_db, TrackerReport& report);
     void confirm(TrackerReport& report);
     void merge(TrackerReport& report);
     void remove_lost(TrackerReport& report);
@@ -277,22 +277,22 @@ TrackerReport Tracker<S>::step(std::span<const Measurement<S>> measurements) {
         measurements = measurements.first(kMaxMeasurements);
     }
     std::uint64_t free = 0;
-    S range_variance(0);
-    index_.clear();
+    Vec2<S> largest(S(0), S(0));
+    index_.clear(measurements.size());
     for (std::size_t i = 0; i < measurements.size(); ++i) {
         const Measurement<S>& m = measurements[i];
-        if (usable(m)) {
-            free |= bit(i);
-            if (m.variance[0] > range_variance) range_variance = m.variance[0];
-            index_.add(m.z[1], m.variance[1]);
-        } else {
+        if (!usable(m)) {
             ++report.invalid_measurements;
-            index_.add(S(0), S(0));
+            continue;
         }
+        free |= bit(i);
+        if (m.variance[0] > largest[0]) largest[0] = m.variance[0];
+        if (m.variance[1] > largest[1]) largest[1] = m.variance[1];
+        index_.add(i, m.z[1]);
     }
     predict();
-    free &= ~associate_and_update(true, measurements, free, range_variance, report);
-    free &= ~associate_and_update(false, measurements, free, range_variance, report);
+    free &= ~associate_and_update(true, measurements, free, largest, report);
+    free &= ~associate_and_update(false, measurements, free, largest, report);
     remove_lost(report);
     start(measurements, free, report);
     confirm(report);
@@ -314,28 +314,40 @@ void Tracker<S>::predict() {
             t.x = predict_state(t.x, config_.motion);
             t.covariance = predict_covariance(t.covariance, config_.motion, noise);
         }
-        t.existence *= config_.survival;
+        t.existence = weighted(config_.survival, t.existence);
         if (t.age < 0xFFFF) ++t.age;
     }
 }
 
-/// Another confirmed track is so near that the two may give one detection.
+/// Confirmed tracks so near another confirmed one that the two may give one detection, as bits.
 template <class S>
-bool Tracker<S>::obscured(const Track<S>& track) const {
-    for (const Track<S>& other : tracks()) {
-        const Vec2<S> d = gate_.innovation(track.x, other.x);
-        if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps &&
-            other.is_confirmed() && other.id != track.id)
-            return true;
+[[gnu::noinline]] std::uint32_t Tracker<S>::obscured() const {
+    Scratch<std::uint8_t, kMaxTracks> confirmed;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        if (track_[i].is_confirmed()) confirmed[count++] = static_cast<std::uint8_t>(i);
     }
-    return false;
+    // Nearly all pairs are farther apart in range than a fold in range rate could explain.
+    const S reach = config_.resolution_range_m + gate_.most_shift();
+    std::uint32_t set = 0;
+    for (std::size_t a = 1; a < count; ++a) {
+        const Vec2<S> x = track_[confirmed[a]].x;
+        for (std::size_t b = 0; b < a; ++b) {
+            const Vec2<S>& other = track_[confirmed[b]].x;
+            if (absolute(x[0] - other[0]) > reach) continue;
+            const Vec2<S> d = gate_.innovation(x, other);
+            if (absolute(d[0]) < config_.resolution_range_m && absolute(d[1]) < config_.resolution_rate_mps)
+                set |= 1U << confirmed[a] | 1U << confirmed[b];
+        }
+    }
+    return set;
 }
 
 /// Gates, associates and updates all confirmed or all tentative tracks. Returns the claimed measurements.
-/// `range_variance`: the largest of the measurements.
+/// `largest_variance`: of the measurements, in range and in range rate.
 template <class S>
 std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const Measurement<S>> measurements,
-                                               std::uint64_t usable, S range_variance,
+                                               std::uint64_t usable, const Vec2<S>& largest_variance,
                                                TrackerReport& report) {
     std::array<S, kMaxConfirmed> existence;
     std::array<RankInput<S>, kHasExistence ? kMaxConfirmed : 0> rank;
@@ -344,17 +356,18 @@ std::uint64_t Tracker<S>::associate_and_update(bool confirmed, std::span<const M
         for (std::size_t i = 0; i < measurements.size(); ++i) strength[i] = measurements[i].snr_db;
     }
     std::size_t rows = 0;
+    const std::uint32_t obscured = confirmed ? this->obscured() : 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         const Track<S>& t = track_[i];
         if (t.is_confirmed() != confirmed) continue;
         AssociationRow<S>& row = row_[rows];
-        const bool hidden = confirmed && obscured(t);
-        const S rate_reach = gate_.rate_reach(t.covariance, index_.largest_variance(), hidden);
+        const bool hidden = (obscured >> i & 1) != 0;
+        const S rate_reach = gate_.rate_reach(t.covariance, largest_variance[1], hidden);
         gate_.fill(
             row, t.x, t.covariance, measurements, usable & index_.near(t.x[1], index_.width(rate_reach)),
             hidden,
             [&](const Vec2<S>& z) { return config_.gate.nonparametric ? S(0) : clutter_.log_excess(z); },
-            gate_.range_reach(t.covariance, range_variance, hidden));
+            gate_.range_reach(t.covariance, largest_variance[0], hidden));
         S counted(0);
         if (config_.gate.nonparametric) {
             counted = gate_.log_counted_excess(row, t, measurements);
@@ -448,7 +461,7 @@ void Tracker<S>::update(Track<S>& track, const AssociationRow<S>& row,
     for (const Candidate<S>& c : row.candidates()) {
         if (main == nullptr || c.weight > main->weight) main = &c;
     }
-    track.snr_db += (measurements[main->measurement].snr_db - track.snr_db) * constant<S>(1, 8);
+    track.snr_db += weighted(constant<S>(1, 8), S(measurements[main->measurement].snr_db - track.snr_db));
 }
 
 /// Covariance after the motion of a state known as well as a measurement.
@@ -494,10 +507,11 @@ template <class S>
     }
 }
 
-/// A tentative track from a pending measurement and m; false where there is no room for it.
+/// A tentative track from a pending measurement and m; false where there is no place for it. `room`: for how
+/// many more there is without giving up another.
 template <class S>
 [[gnu::noinline]] bool Tracker<S>::begin_track(const Start& start, const Measurement<S>& m,
-                                               const Vec2<S>& noise, TrackerReport& report) {
+                                               const Vec2<S>& noise, int& room, TrackerReport& report) {
     const auto from = static_cast<std::size_t>(start.from);
     const Pending& pending = pending_[from];
     const StartMotion& motion = motion_of(from);
@@ -509,7 +523,12 @@ template <class S>
     track.x[0] += move[0];
     track.x[1] += move[1];
     track.covariance = innovation.posterior();
-    if (!in_field(track) || !make_room_for_tentative(m.snr_db, report)) return false;
+    if (!in_field(track)) return false;
+    if (room > 0) {
+        --room;
+    } else if (!replace_tentative(m.snr_db, report)) {
+        return false;
+    }
     track.id = next_id();
     track.state = TrackState::tentative;
     track.existence = existence_of_start(clutter_.log_excess(m.z));
@@ -526,15 +545,18 @@ template <class S>
 template <class S>
 void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64_t unclaimed,
                        TrackerReport& report) {
-    index_.clear();
     Scratch<S, kMaxMeasurements> expected;  // ranges of the pending measurements by now
-    S pending_variance(0);                  // the largest in range
+    Vec2<S> pending_variance(S(0), S(0));   // the largest
     S pending_rate(0);                      // the largest either way
+    index_.clear(pending_count_);
+    S time_s = start_motion_[1].time_s;
     for (std::size_t i = 0; i < pending_count_; ++i) {
+        if (i == old_pending_count_) time_s = start_motion_[0].time_s;
         const Pending& p = pending_[i];
-        index_.add(p.z[1], p.noise[1]);
-        expected[i] = p.z[0] + motion_of(i).time_s * p.z[1];
-        if (p.noise[0] > pending_variance) pending_variance = p.noise[0];
+        index_.add(i, p.z[1]);
+        expected[i] = p.z[0] + time_s * p.z[1];
+        if (p.noise[0] > pending_variance[0]) pending_variance[0] = p.noise[0];
+        if (p.noise[1] > pending_variance[1]) pending_variance[1] = p.noise[1];
         if (absolute(p.z[1]) > pending_rate) pending_rate = absolute(p.z[1]);
     }
     Vec2<S> variance = gate_.noise({{S(0), S(0)}, {S(0), S(0)}, S(0)}, false);  // the largest of this frame
@@ -546,17 +568,18 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
     // Of the oldest pending measurements: the others are nearer.
     const StartMotion& motion = start_motion_[kStartFrames - 1];
     const S gate = config_.gate.gate;
-    const S rate_reach = sqrt_above(gate, S(index_.largest_variance() + motion.noise(1, 1) + variance[1]));
+    const S rate_reach = sqrt_above(gate, S(pending_variance[1] + motion.noise(1, 1) + variance[1]));
     const std::uint32_t width = index_.width(rate_reach);
-    const S moved = motion.noise(0, 0) + motion.time_s * (motion.time_s * index_.largest_variance());
-    const S reach = sqrt_above(gate, S(pending_variance + variance[0] + moved)) + motion.fold_step_m;
+    const S moved = motion.noise(0, 0) + motion.time_s * (motion.time_s * pending_variance[1]);
+    const S reach = sqrt_above(gate, S(pending_variance[0] + variance[0] + moved)) + motion.fold_step_m;
     // Range rates smaller than this are on the same side of a fold as all pending ones within reach; those of
     // the others may make the expected range wrong.
     const S unfolded = config_.gate.rate_span_mps - pending_rate - rate_reach;
-    const S folded_reach = reach + absolute(config_.gate.alias_range_m) * Gate<S>::kMaxFolds;
+    const S folded_reach = reach + gate_.most_shift();
 
     std::uint64_t used = 0;
     std::uint64_t left = unclaimed;
+    int room = kMaxTentative - count_of(false);
     int pairs = 0;
     for (const std::uint32_t index : Bits(unclaimed)) {
         if (pairs >= kMaxStartPairs) {
@@ -570,16 +593,16 @@ void Tracker<S>::start(std::span<const Measurement<S>> measurements, std::uint64
         const bool folded = absolute(m.z[1]) >= unfolded;
         const S most_off = folded ? folded_reach : reach;
         Start best;
-        for (const std::uint32_t from : Bits(index_.near(m.z[1], width) & ~used)) {
+        for_each_bit(index_.near(m.z[1], width) & ~used, [&](std::uint32_t from) {
             ++pairs;
             const S off = absolute(range - expected[from]);
-            if (off > most_off) continue;
+            if (off > most_off) return;
             const S range_variance = own_variance + pending_[from].noise[0];
             const auto too_far = [&](S d) { return product_exceeds(d, d, gate, range_variance); };
-            if (!folded && too_far(off) && too_far(off - motion_of(from).fold_step_m)) continue;
+            if (!folded && too_far(off) && too_far(off - motion_of(from).fold_step_m)) return;
             consider_start(from, range_variance, m.z, noise, best);
-        }
-        if (best.from < 0 || !begin_track(best, m, noise, report)) continue;
+        });
+        if (best.from < 0 || !begin_track(best, m, noise, room, report)) continue;
         used |= bit(static_cast<std::size_t>(best.from));
         left &= ~bit(index);
     }
@@ -594,8 +617,8 @@ void Tracker<S>::remember(std::span<const Measurement<S>> measurements, std::uin
     clutter_.forget();
     const auto room = kMaxMeasurements - static_cast<std::size_t>(std::popcount(unclaimed));
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < pending_count_; ++i) {
-        if ((used & bit(i)) != 0) continue;
+    const std::uint64_t all = pending_count_ == 0 ? 0 : ~std::uint64_t{0} >> (64 - pending_count_);
+    for (const std::uint32_t i : Bits(all & ~used)) {
         if (i < old_pending_count_ || kept >= room) {
             clutter_.add(pending_[i].z);
         } else {
@@ -620,8 +643,7 @@ Track<S>* Tracker<S>::weakest(bool confirmed) {
 
 /// With kMaxTentative already, the weakest gives way to a stronger one.
 template <class S>
-bool Tracker<S>::make_room_for_tentative(S snr_db, TrackerReport& report) {
-    if (count_of(false) < kMaxTentative) return true;
+bool Tracker<S>::replace_tentative(S snr_db, TrackerReport& report) {
     ++report.dropped_for_capacity;
     Track<S>* const t = weakest(false);
     if (snr_db <= t->snr_db) return false;
@@ -672,15 +694,17 @@ void Tracker<S>::merge(TrackerReport& report) {
         const Innovation<S> accuracy(a.covariance, least);
         return accuracy.valid() && accuracy.distance2(d) < limit;
     };
-    index_.clear();
-    S range_variance(0);
-    for (const Track<S>& t : tracks()) {
-        const bool coasting = t.misses >= kCoasting;
-        index_.add(t.x[1], coasting ? S(0) : t.covariance(1, 1));
-        if (!coasting && t.covariance(0, 0) > range_variance) range_variance = t.covariance(0, 0);
+    Vec2<S> variance(S(0), S(0));  // the largest of those that may stay
+    index_.clear(tracks().size());
+    for (std::size_t i = 0; i < tracks().size(); ++i) {
+        const Track<S>& t = track_[i];
+        index_.add(i, t.x[1]);
+        if (t.misses >= kCoasting) continue;
+        if (t.covariance(0, 0) > variance[0]) variance[0] = t.covariance(0, 0);
+        if (t.covariance(1, 1) > variance[1]) variance[1] = t.covariance(1, 1);
     }
-    const S range_reach = sqrt_above(limit, S(range_variance + least[0]));
-    const std::uint32_t width = index_.width(sqrt_above(limit, S(index_.largest_variance() + least[1])));
+    const S range_reach = sqrt_above(limit, S(variance[0] + least[0]));
+    const std::uint32_t width = index_.width(sqrt_above(limit, S(variance[1] + least[1])));
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         Track<S>& b = track_[i];
         bool same = false;
@@ -704,12 +728,13 @@ void Tracker<S>::merge(TrackerReport& report) {
 
 template <class S>
 void Tracker<S>::remove_lost(TrackerReport& report) {
+    const S most = config_.max_range_sigma_m * config_.max_range_sigma_m;
     for (Track<S>& t : live()) {
         if (!in_field(t)) {
             t.state = TrackState::free;
             ++report.left;
         } else if (t.existence < config_.delete_existence || t.misses > config_.max_misses ||
-                   t.covariance(0, 0) > config_.max_range_sigma_m * config_.max_range_sigma_m) {
+                   t.covariance(0, 0) > most) {
             t.state = TrackState::free;
             ++report.deleted;
         }
@@ -731,12 +756,11 @@ std::uint8_t Tracker<S>::next_id() {
 template <class S>
 void Tracker<S>::erase_free() {
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+    while (kept < static_cast<std::size_t>(count_) && track_[kept].state != TrackState::free) ++kept;
+    for (std::size_t i = kept; i < static_cast<std::size_t>(count_); ++i) {
         if (track_[i].state == TrackState::free) continue;
-        if (kept != i) {
-            track_[kept] = track_[i];
-            if constexpr (kHasModes) modes_[kept] = modes_[i];
-        }
+        track_[kept] = track_[i];
+        if constexpr (kHasModes) modes_[kept] = modes_[i];
         ++kept;
     }
     count_ = static_cast<int>(kept);

@@ -1,5 +1,9 @@
 #include "hal/common/slcan.hpp"
 
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
 namespace hal {
 namespace {
 
@@ -14,23 +18,28 @@ int digit(char c) {
     return -1;
 }
 
-char hex(unsigned value) {
-    return "0123456789ABCDEF"[value & 15U];
+/// Writes the four hexadecimal digits of two bytes, those of `first` in front.
+void put_hex(char* out, std::uint32_t first, std::uint32_t second) {
+    const std::uint32_t bytes = first | second << 16;
+    const std::uint32_t digits = (bytes >> 4 & 0x000F'000F) | (bytes & 0x000F'000F) << 8;  // a digit a byte
+    const std::uint32_t letters = (digits + 0x0606'0606) >> 4 & 0x0101'0101;  // 1 where it is one
+    const std::uint32_t characters = digits + 0x3030'3030 + letters * ('A' - '0' - 10);
+    static_assert(std::endian::native == std::endian::little);
+    std::memcpy(out, &characters, sizeof characters);
 }
 
 }  // namespace
 
 SlcanText encode_slcan(const can::Frame& frame) {
     SlcanText text;
-    const auto put = [&text](char c) { text.characters[text.size++] = c; };
-    put('t');
-    for (int shift = 8; shift >= 0; shift -= 4) put(hex(static_cast<unsigned>(frame.id) >> shift));
-    put(hex(frame.length));
-    for (std::size_t i = 0; i < frame.length; ++i) {
-        put(hex(static_cast<unsigned>(frame.data[i]) >> 4));
-        put(hex(frame.data[i]));
-    }
-    put('\r');
+    char* const out = text.characters.data();
+    put_hex(out, frame.id >> 8, frame.id & 0xFFU);  // the first digit is 0
+    out[0] = 't';
+    out[4] = static_cast<char>('0' + frame.length);
+    for (std::size_t i = 0; i < frame.data.size(); i += 2)
+        put_hex(out + 5 + 2 * i, frame.data[i], frame.data[i + 1]);
+    text.size = 6U + 2U * frame.length;
+    out[text.size - 1] = '\r';
     return text;
 }
 

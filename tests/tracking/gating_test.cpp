@@ -155,8 +155,8 @@ TEST(Gating, ReachInRangeTurnsAwayNothingOfTheGate) {
         AssociationRow<Real> near;
         gate.fill(all, x, p, measurements, kAll, obscured);
         gate.fill(
-            near, x, p, measurements, kAll, obscured, [](const Vec2<Real>&) { return Real(0); },
-            gate.range_reach(p, variance, obscured));
+            near, x, p, measurements, (1U << measurements.size()) - 1, obscured,
+            [](const Vec2<Real>&) { return Real(0); }, gate.range_reach(p, variance, obscured));
         LONGS_EQUAL(all.count, near.count);
         for (int i = 0; i < all.count; ++i) {
             const auto& c = near.item[static_cast<std::size_t>(i)];

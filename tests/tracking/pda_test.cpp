@@ -1,6 +1,11 @@
 // Expected values: probabilistic data association as in the textbooks (Bar-Shalom, Li and Kirubarajan 2001),
 // written out in double precision.
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <random>
+#include <span>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -19,6 +24,7 @@ using tracking::GateConfig;
 using tracking::Mat2;
 using tracking::Measurement;
 using tracking::Vec2;
+using tracking_test::scalar;
 using tracking_test::value;
 
 namespace {
@@ -87,6 +93,88 @@ TEST_GROUP(Pda){};
 TEST(Pda, UpdateIsTheTextbooks) {
     update_is_the_textbooks<double>(1e-12);
     update_is_the_textbooks<Real>(5e-6);
+}
+
+TEST(Pda, FixedPointUpdateKeepsItsErrorBounds) {
+    // Expected: the update in double precision on the very same numbers. Measurements up to 100 times as
+    // inaccurate as others, correlated predictions, weights that are the betas and others.
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> u(-1, 1);
+    GateConfig<Real> config;
+    config.min_range_sigma_m = config.min_rate_sigma_mps = constant<Real>(1, 100);
+    const Gate<Real> gate(config);
+    GateConfig<double> reference_config;
+    reference_config.min_range_sigma_m = reference_config.min_rate_sigma_mps = 0.01;
+    const Gate<double> reference_gate(reference_config);
+    double worst_mean = 0;        // in parts of the bound
+    double worst_covariance = 0;  // in parts of the bound
+    for (int trial = 0; trial < 20'000; ++trial) {
+        const double a = std::pow(10, u(random)) / 3;
+        const double b = std::pow(10, u(random)) / 3;
+        Mat2<Real> p;
+        p(0, 0) = scalar<Real>(a * a);
+        p(1, 1) = scalar<Real>(b * b);
+        p(0, 1) = p(1, 0) = scalar<Real>(0.99 * u(random) * a * b);
+        const Eigen::Matrix2d exact_p{{value(p(0, 0)), value(p(0, 1))}, {value(p(1, 0)), value(p(1, 1))}};
+
+        const int count = 1 + static_cast<int>(random() % 16);
+        std::vector<Measurement<Real>> measurements;
+        std::vector<Measurement<double>> exact;
+        AssociationRow<Real> row;
+        AssociationRow<double> exact_row;
+        std::vector<double> beta(static_cast<std::size_t>(count));
+        double sum = 0.1 + 0.1 * u(random);
+        const double missed = sum;
+        for (double& v : beta) sum += v = 0.05 + 1 + u(random);
+        double scale_range = a * a;  // of P, R and squared moves
+        double scale_rate = b * b;
+        double independent = 1;
+        for (std::size_t i = 0; i < beta.size(); ++i) {
+            Measurement<Real> m;
+            m.variance = {scalar<Real>(0.01 * std::pow(10, 1 + u(random))),
+                          scalar<Real>(0.01 * std::pow(10, 1 + u(random)))};
+            const double s0 = value(p(0, 0)) + value(m.variance[0]);
+            const double s1 = value(p(1, 1)) + value(m.variance[1]);
+            m.z = {scalar<Real>(4 * u(random) * std::sqrt(s0)), scalar<Real>(4 * u(random) * std::sqrt(s1))};
+            measurements.push_back(m);
+            exact.push_back({{value(m.z[0]), value(m.z[1])},
+                             {value(m.variance[0]), value(m.variance[1])},
+                             value(m.snr_db)});
+            const double rho2 = value(p(0, 1)) * value(p(0, 1)) / (s0 * s1);
+            independent = std::min(independent, 1 - rho2);
+            scale_range = std::max(scale_range, 16 * s0);
+            scale_rate = std::max(scale_rate, 16 * s1);
+            const Real share = scalar<Real>(beta[i] / sum);
+            const Real weight = trial % 2 == 0 ? share : scalar<Real>(i == 0 ? 1 - missed / sum : 0);
+            row.item[i] = {static_cast<std::uint16_t>(i), Real(0), share, weight};
+            exact_row.item[i] = {static_cast<std::uint16_t>(i), 0, value(share), value(weight)};
+        }
+        row.count = exact_row.count = count;
+        row.missed = scalar<Real>(missed / sum);
+        exact_row.missed = value(row.missed);
+
+        Vec2<Real> x(Real(0), Real(0));
+        tracking::update_with_row(x, p, row, std::span<const Measurement<Real>>(measurements), gate);
+        Vec2<double> exact_x(0, 0);
+        Mat2<double> updated = exact_p;
+        tracking::update_with_row(exact_x, updated, exact_row, std::span<const Measurement<double>>(exact),
+                                  reference_gate);
+        const double lsb = std::ldexp(4, -22);
+        const double part = std::ldexp(1, -18) / independent;
+        const auto worsen = [](double& worst, double error, double bound) {
+            worst = std::max(worst, std::abs(error) / bound);
+        };
+        worsen(worst_mean, value(x[0]) - exact_x[0], lsb + part * std::sqrt(scale_range));
+        worsen(worst_mean, value(x[1]) - exact_x[1], lsb + part * std::sqrt(scale_rate));
+        worsen(worst_covariance, value(p(0, 0)) - updated(0, 0), lsb + part * scale_range);
+        worsen(worst_covariance, value(p(1, 1)) - updated(1, 1), lsb + part * scale_rate);
+        worsen(worst_covariance, value(p(0, 1)) - updated(0, 1),
+               lsb + part * std::sqrt(scale_range * scale_rate));
+        CHECK(p(0, 1) == p(1, 0));
+    }
+    std::printf("update: mean at %.3f, covariance at %.3f of their bounds\n", worst_mean, worst_covariance);
+    CHECK(worst_mean <= 1);
+    CHECK(worst_covariance <= 1);
 }
 
 TEST(Pda, NoScaleOfLikelihoodsEmptiesARow) {
