@@ -277,8 +277,13 @@ std::vector<Row> fixed_against_double() {
                 const auto exact = reference.tracks();
                 if (!std::equal(
                         fixed.begin(), fixed.end(), exact.begin(), exact.end(),
-                        [](const auto& f, const auto& e) { return f.id == e.id && f.state == e.state; }))
+                        [](const auto& f, const auto& e) { return f.id == e.id && f.state == e.state; })) {
+                    // A measurement at the very edge of a gate is in for one and out for the other. What
+                    // follows are two histories, which no arithmetic makes equal: both begin anew.
+                    tracker = tracking::Tracker<Real>(config);
+                    reference = tracking::Tracker<double>(as_double(config));
                     continue;
+                }
                 ++equal;
                 for (std::size_t i = 0; i < fixed.size(); ++i) {
                     worst_range_m = std::max(worst_range_m, std::fabs(number(fixed[i].x[0]) - exact[i].x[0]));
