@@ -122,9 +122,10 @@ constexpr std::uint32_t high_bytes(Pair a, Pair b) {
     return (a & 0xFF00'FF00U) | (b >> 8 & 0x00FF'00FFU);
 }
 constexpr std::uint32_t bytes_at_least(std::uint32_t a, std::uint32_t b) {
-    std::uint32_t result = 0;
-    for (int i = 0; i < 32; i += 8) result |= ((a >> i & 0xFFU) >= (b >> i & 0xFFU) ? 1U : 0U) << i;
-    return result;
+    constexpr std::uint32_t kTops = 0x80808080U;
+    const std::uint32_t lower_bits =
+        (a | kTops) - (b & ~kTops);  // a byte's top stays where it does not borrow
+    return ((a & ~b) | (~(a ^ b) & lower_bits)) >> 7 & 0x01010101U;
 }
 constexpr std::uint32_t reverse_bits(std::uint32_t a) {
     std::uint32_t result = 0;
