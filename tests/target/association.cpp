@@ -17,7 +17,9 @@
 #include <string_view>
 
 #include "firmware/text_line.hpp"
+#include "hal/common/uart_console.hpp"
 #include "independent_timer.hpp"
+#include "tests/target/patient_uart.hpp"
 #include "tests/target/semihosting.hpp"
 #include "tracking/tracker.hpp"
 
@@ -41,6 +43,9 @@ struct Scene {
     Measurements measurement{};
     std::size_t measurements = 0;
 };
+
+target::PatientUart patient_uart(target::uart);
+hal::UartConsole figures(patient_uart);
 
 // Too large for a stack.
 Scene scene;
@@ -175,11 +180,11 @@ void measure(std::string_view kind, std::string_view variant, Associator associa
             .text(kPartNames[part])
             .text(" ")
             .number(spent[part] / static_cast<std::uint32_t>(repetitions));
-        target::console.line(line.view());
+        figures.line(line.view());
     }
     firmware::TextLine line = line_of(kind, scene.tracks, scene.measurements, variant, associator);
     line.text(" ").number(sum / static_cast<std::uint32_t>(repetitions));
-    target::console.line(line.view());
+    figures.line(line.view());
 }
 
 void all_must_be_gated() {
@@ -215,7 +220,7 @@ void measure_tracker(Associator associator) {
     const auto print = [&](std::string_view what, std::uint32_t value) {
         firmware::TextLine line;
         line.text("bench tracker.").text(what).text(".").text(name_of(associator)).text(" ").number(value);
-        target::console.line(line.view());
+        figures.line(line.view());
     };
     print("mean", sum / (kFrames - kFrames / 3));
     print("worst", worst);

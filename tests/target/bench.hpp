@@ -7,9 +7,14 @@
 #include <string_view>
 
 #include "firmware/text_line.hpp"
+#include "hal/common/uart_console.hpp"
 #include "target_board.hpp"
+#include "tests/target/patient_uart.hpp"
 
 namespace target {
+
+inline PatientUart patient_uart(uart);
+inline hal::UartConsole figures(patient_uart);
 
 inline void start_bench() {
     start_uart();
@@ -19,7 +24,7 @@ inline void start_bench() {
 inline void print_figure(std::string_view kind, std::string_view name, std::uint32_t value) {
     firmware::TextLine line;
     line.text(kind).text(" ").text(name).text(" ").number(value);
-    uart_console.line(line.view());
+    figures.line(line.view());
 }
 
 /// Mean of `repeats` calls work(i), i from 0, printed under `name`. The call and the loop, some five
