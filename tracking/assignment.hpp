@@ -69,9 +69,10 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
     for (std::size_t t = 0; t < rows.size(); ++t) {
         out.candidate[t] = kNone;
         for (const Candidate<S>& c : rows[t].candidates()) {
-            out.owner[c.measurement] = kNone;
-            out.measurement_price[c.measurement] = S(0);
-            reached[c.measurement].for_row = kNone;
+            const std::uint16_t j = c.measurement;  // bytes may alias it
+            out.owner[j] = kNone;
+            out.measurement_price[j] = S(0);
+            reached[j].for_row = kNone;
         }
     }
     const auto measurement_of = [&](int row, int c) {
@@ -81,15 +82,19 @@ void assign_best(std::span<const AssociationRow<S>> rows, Weight weight, MissedW
     const int row_count = static_cast<int>(rows.size());
     for (int start = 0; start < row_count; ++start) {
         const S missed = missed_weight(start);
-        S price(0);
-        int favourite = kNone;
-        for (int c = 0; c < rows[static_cast<std::size_t>(start)].count; ++c) {
-            const S gain = weight(start, c) - out.measurement_price[measurement_of(start, c)];
-            if (favourite != kNone && !(gain > price)) continue;
+        const int count = rows[static_cast<std::size_t>(start)].count;
+        const auto gain = [&](int c) {
+            return S(weight(start, c) - out.measurement_price[measurement_of(start, c)]);
+        };
+        int favourite = 0;
+        S price = count > 0 ? gain(0) : missed;
+        for (int c = 1; c < count; ++c) {
+            const S other = gain(c);
+            if (!(other > price)) continue;
             favourite = c;
-            price = gain;
+            price = other;
         }
-        if (favourite == kNone || price < missed) {
+        if (count == 0 || price < missed) {
             out.row_price[static_cast<std::size_t>(start)] = missed;
             continue;
         }

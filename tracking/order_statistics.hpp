@@ -153,10 +153,9 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             detail::choose_optimally(read, dominants);
             break;
     }
-    const auto reduced = [&](const Candidate<S>& c, int owner, bool has_dominant) {
+    const auto reduced = [&](const Candidate<S>& c, int owner) {
         if (config.reduction == Reduction::divide) return S(c.beta * reciprocal(config.alpha));
         if (owner == detail::kNobody) return c.beta;
-        if (config.reduction == Reduction::exclusive && has_dominant) return S(0);
         const auto o = static_cast<std::size_t>(owner);
         return S(c.beta * (S(1) - rows[o].item[static_cast<std::size_t>(dominants.candidate[o])].beta));
     };
@@ -168,6 +167,7 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             continue;
         }
         const bool has_dominant = dominants.candidate[t] != detail::kNobody;
+        const bool drop_claimed = config.reduction == Reduction::exclusive && has_dominant;
         bool changed = config.missed == MissedColumn::drop;
         S sum(0);
         for (Candidate<S>& c : row.candidates()) {
@@ -175,8 +175,10 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             if (owner == static_cast<int>(t) || (owner == detail::kNobody && free_stay)) {
                 c.weight = c.beta;
             } else {
-                c.weight = reduced(c, owner, has_dominant);
                 changed = true;
+                c.weight = S(0);
+                if (drop_claimed && owner != detail::kNobody) continue;
+                c.weight = reduced(c, owner);
             }
             sum += c.weight;
         }
