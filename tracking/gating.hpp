@@ -153,11 +153,12 @@ class Gate {
                 near[count++] = static_cast<std::uint8_t>(index);
         });
         for (std::size_t i = 0; i < count; ++i) {
-            const Measurement<S>& m = measurements[near[i]];
+            const std::uint8_t index = near[i];
+            const Measurement<S>& m = measurements[index];
             S distance2(0);
             S log_density(0);
             if (!test(innovation(x, m.z), p, noise(m, obscured), distance2, log_density)) continue;
-            insert(row, near[i], logs.detected + log_density - log_excess(m.z));
+            insert(row, index, logs.detected + log_density - log_excess(m.z));
         }
     }
     /// The same with clutter as expected everywhere. Bits in `usable` past the measurements are ignored.

@@ -17,6 +17,7 @@
 #include "tracking/assignment.hpp"
 #include "tracking/association.hpp"
 #include "tracking/scalar.hpp"
+#include "tracking/scratch.hpp"
 #include "tracking/track.hpp"
 
 namespace tracking {
@@ -153,20 +154,27 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
             detail::choose_optimally(read, dominants);
             break;
     }
+    // What the owner of a measurement leaves to others. Betas change below.
+    Scratch<S, kMaxTracks> left;
+    for (std::size_t t = 0; t < rows.size(); ++t) {
+        const int own = dominants.candidate[t];
+        if (own != detail::kNobody) left[t] = S(1) - rows[t].item[static_cast<std::size_t>(own)].beta;
+    }
     const auto reduced = [&](const Candidate<S>& c, int owner) {
         if (config.reduction == Reduction::divide) return S(c.beta * reciprocal(config.alpha));
-        if (owner == detail::kNobody) return c.beta;
-        const auto o = static_cast<std::size_t>(owner);
-        return S(c.beta * (S(1) - rows[o].item[static_cast<std::size_t>(dominants.candidate[o])].beta));
+        return owner == detail::kNobody ? c.beta : S(c.beta * left[static_cast<std::size_t>(owner)]);
     };
     const bool free_stay = config.reduced == Reduced::claimed_by_others;
     for (std::size_t t = 0; t < rows.size(); ++t) {
         AssociationRow<S>& row = rows[t];
+        const bool has_dominant = dominants.candidate[t] != detail::kNobody;
+        const bool trusted = config.covariance == CovarianceBetas::reshaped ||
+                             (config.covariance == CovarianceBetas::decided && has_dominant);
         if (row.count == 0) {
             row.missed_weight = S(1);
+            if (trusted) row.missed = S(1);
             continue;
         }
-        const bool has_dominant = dominants.candidate[t] != detail::kNobody;
         const bool drop_claimed = config.reduction == Reduction::exclusive && has_dominant;
         bool changed = config.missed == MissedColumn::drop;
         S sum(0);
@@ -191,15 +199,12 @@ void order_statistics(std::span<AssociationRow<S>> rows, const OrderStatisticsCo
         }
         const auto scale = reciprocal(sum);
         row.missed_weight = share(row.missed_weight, scale);
-        for (Candidate<S>& c : row.candidates()) c.weight = share(c.weight, scale);
-    }
-    if (config.covariance == CovarianceBetas::original) return;
-    for (std::size_t t = 0; t < rows.size(); ++t) {
-        if (config.covariance == CovarianceBetas::decided && dominants.candidate[t] == detail::kNobody)
-            continue;
-        AssociationRow<S>& row = rows[t];
-        for (Candidate<S>& c : row.candidates()) c.beta = c.weight;
-        row.missed = row.missed_weight;
+        if (trusted) {
+            row.missed = row.missed_weight;
+            for (Candidate<S>& c : row.candidates()) c.beta = c.weight = share(c.weight, scale);
+        } else {
+            for (Candidate<S>& c : row.candidates()) c.weight = share(c.weight, scale);
+        }
     }
 }
 
