@@ -41,6 +41,12 @@ struct Quad {
 inline Quad load_quad(const std::int16_t* samples) {
     return Quad(_mm_loadu_si128(reinterpret_cast<const __m128i*>(samples)));
 }
+inline void store_quad(std::int16_t* samples, Quad a) {
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(samples), a.v);
+}
+inline Sum4 load_sums(const std::int32_t* sums) {
+    return Sum4(_mm_loadu_si128(reinterpret_cast<const __m128i*>(sums)));
+}
 /// Words i .. i + 3 of four rows, `stride` words from one to the next, to Quads i .. i + 3.
 template <class T>
 void load_transposed(const T* rows, std::size_t stride, Quad* columns) {
@@ -173,6 +179,15 @@ inline Quad scale_lanes(Quad a, std::int32_t factor_0, std::int32_t factor_1) {
     const __m128i rounded = _mm_add_epi32(factors, _mm_set1_epi32(1 << 15));
     const __m128i part = _mm_shuffle_epi32(_mm_shufflelo_epi16(factors, kLower), kBoth0);
     const __m128i whole = _mm_shuffle_epi32(_mm_shufflelo_epi16(rounded, kUpper), kBoth0);
+    return Quad(_mm_add_epi16(_mm_mullo_epi16(a.v, whole), _mm_mulhi_epi16(a.v, part)));
+}
+/// Both lanes of each word times that word's factor, as scale_0 and scale_1, and the lower 16 bits of these.
+inline Quad scale_words(Quad a, Sum4 factors) {
+    constexpr int kLower = 0b10'10'00'00;
+    constexpr int kUpper = 0b11'11'01'01;
+    const __m128i rounded = _mm_add_epi32(factors.v, _mm_set1_epi32(1 << 15));
+    const __m128i part = _mm_shufflehi_epi16(_mm_shufflelo_epi16(factors.v, kLower), kLower);
+    const __m128i whole = _mm_shufflehi_epi16(_mm_shufflelo_epi16(rounded, kUpper), kUpper);
     return Quad(_mm_add_epi16(_mm_mullo_epi16(a.v, whole), _mm_mulhi_epi16(a.v, part)));
 }
 inline Quad both_lane0(Quad a, Quad b) {

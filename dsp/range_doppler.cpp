@@ -9,6 +9,7 @@
 #include "dsp/frame_quality.hpp"
 #include "dsp/log2.hpp"
 #include "dsp/packed.hpp"
+#include "dsp/packed_x86.hpp"
 #include "dsp/range_fft.hpp"
 #include "dsp/unrolled.hpp"
 
@@ -81,6 +82,15 @@ inline void scale_four(Complex16*& row, const std::int32_t*& weight) {
 /// row[k] = row[k] * weight[k] / 2^16, or / 2^32, rounded down.
 template <bool kUpperHalf>
 void scale(Complex16* row, const std::int32_t* weight) {
+#if DSP_PACKED_FOUR
+    if constexpr (!kUpperHalf) {
+        for (std::size_t k = 0; k < kChirps; k += 4) {
+            const packed::Quad cells = packed::load_quad(&row[k].re);
+            packed::store_quad(&row[k].re, packed::scale_words(cells, packed::load_sums(&weight[k])));
+        }
+        return;
+    }
+#endif
     const std::int32_t* const end = packed::in_register(weight + kChirps);
     do {
         scale_four<kUpperHalf>(row, weight);

@@ -85,6 +85,8 @@ TEST(PackedX86, EveryOperationIsItsTwinFourTimes) {
         same(pack_mixed(qa, qb), [&](std::size_t k) { return pack_mixed(a[k], b[k]); });
         same(scale_lanes(qa, sum[0], sum[1]),
              [&](std::size_t k) { return scale_lanes(a[k], sum[0], sum[1]); });
+        same(scale_words(qa, sums),
+             [&](std::size_t k) { return pack_low(scale_0(sum[k], a[k]), scale_1(sum[k], a[k])); });
         same(both_lane0(qa, qb), [&](std::size_t k) { return both_lane0(a[k], b[k]); });
         same(both_lane1(qa, qb), [&](std::size_t k) { return both_lane1(a[k], b[k]); });
         same(mix_low(sums, qb), [&](std::size_t k) { return mix_low(sum[k], b[k]); });
