@@ -91,6 +91,10 @@ with Emulator("mps2-an500", IMAGE, icount=5) as board:
         with Process(RADAR_MONITOR, "slcan0", "--frames", "40", "--json", os.path.join(OUT, "monitor.json"),
                      name="monitor") as monitor:
             monitor.wait_for("listening")
+            # candump says nothing before it hears something: the board, ten times a second.
+            end = time.monotonic() + 20
+            while os.path.getsize(os.path.join(TMP, "candump.log")) == 0 and time.monotonic() < end:
+                time.sleep(0.02)
             cansend("EgoMotion", 0, Speed=2000, Valid=1)
             heard = bus.next("RadarStatus", where=lambda v: not v["Faults"] & EGO_STALE)
             check("cansend of ego motion: the fault is gone", heard is not None, True)
