@@ -170,6 +170,16 @@ inline Sum4 dot_cross(Quad a, Quad b, Sum4 sum) {
 inline Sum4 dot_cross_minus(Quad a, Quad b, Sum4 sum) {
     return dot(a, detail::conjugate(swap(b)), sum);
 }
+/// The same factors for all four.
+inline Sum4 multiply_00(Quad a, Pair b, Sum4 sum) {
+    return dot(a, b & 0xFFFFU, sum);
+}
+inline Sum4 multiply_10(Quad a, Pair b, Sum4 sum) {
+    return dot(a, b << 16, sum);
+}
+inline Sum4 multiply_11(Quad a, Pair b, Sum4 sum) {
+    return dot(a, b & 0xFFFF'0000U, sum);
+}
 /// A factor of 32 bits is whole * 2^16 + part, both signed: 16 bits of a product with it are those of two.
 inline Quad scale_lanes(Quad a, std::int32_t factor_0, std::int32_t factor_1) {
     constexpr int kBoth0 = 0b00'00'00'00;

@@ -74,30 +74,11 @@ constexpr std::int32_t kUnbiased = 1 << 16;
 inline void put(Complex16* to, Pair x) {
     store(*to, x);
 }
-/// sum + a0 b0 and so on.
-inline std::int32_t times_00(Pair a, Pair b, std::int32_t sum) {
-    return packed::multiply_00(a, b, sum);
-}
-inline std::int32_t times_10(Pair a, Pair b, std::int32_t sum) {
-    return packed::multiply_10(a, b, sum);
-}
-inline std::int32_t times_11(Pair a, Pair b, std::int32_t sum) {
-    return packed::multiply_11(a, b, sum);
-}
 #if DSP_PACKED_FOUR
 inline void put(Complex16* to, Quad x) {
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(to), x.v);
+    packed::store_quad(&to->re, x);
 }
 using packed::Sum4;
-inline Sum4 times_00(Quad a, Pair b, Sum4 sum) {
-    return packed::dot(a, b & 0xFFFFU, sum);
-}
-inline Sum4 times_10(Quad a, Pair b, Sum4 sum) {
-    return packed::dot(a, b << 16, sum);
-}
-inline Sum4 times_11(Quad a, Pair b, Sum4 sum) {
-    return packed::dot(a, b & 0xFFFF'0000U, sum);
-}
 #endif
 
 /// Between the passes.
@@ -298,12 +279,12 @@ inline void first_row(Word y01, Word y23, Word y45, Word y67, Sum mean, const Pa
     Pair plus = 0;
     Pair minus = 0;
     take_pair(table, plus, minus);
-    put(cell(2), pack_high(times_00(a2, minus, times_00(a0, plus, kHalf)),
-                           times_10(a2, minus, times_10(a0, plus, kHalf))));
-    put(cell(1), pack_high(times_11(a3, plus, dot_minus(a1, plus, kUnbiasedHalf)),
-                           times_11(a1, plus, dot_minus(a3, minus, kUnbiasedHalf))));
-    put(cell(3), pack_high(times_11(a3, minus, dot(a1, plus, kUnbiasedHalf)),
-                           times_11(a1, plus, dot(a3, plus, kUnbiasedHalf))));
+    put(cell(2), pack_high(multiply_00(a2, minus, multiply_00(a0, plus, kHalf)),
+                           multiply_10(a2, minus, multiply_10(a0, plus, kHalf))));
+    put(cell(1), pack_high(multiply_11(a3, plus, dot_minus(a1, plus, kUnbiasedHalf)),
+                           multiply_11(a1, plus, dot_minus(a3, minus, kUnbiasedHalf))));
+    put(cell(3), pack_high(multiply_11(a3, minus, dot(a1, plus, kUnbiasedHalf)),
+                           multiply_11(a1, plus, dot(a3, plus, kUnbiasedHalf))));
 }
 
 /// Of one chirp: 64 times the mean is `whole` times 64 and `rest`.

@@ -129,10 +129,9 @@ class Gate {
     }
 
     /// Candidates of a track predicted at (x, P) among the measurements whose bit is set in `usable`, none of
-    /// them past the last. Of more
-    /// than kMaxGated the likeliest are kept. Betas are left to a solver. `log_excess(z)`: ln of the clutter
-    /// density at z over config().clutter_density, asked of measurements in the gate only. `range_reach`:
-    /// what is farther away in range need not be looked at closer.
+    /// them past the last. Of more than kMaxGated the likeliest are kept. Betas are left to a solver.
+    /// `log_excess(z)`: ln of the clutter density at z over config().clutter_density, asked of measurements
+    /// in the gate only. `range_reach`: what is farther away in range need not be looked at closer.
     template <class LogExcess>
     void fill(AssociationRow<S>& row, const Vec2<S>& x, const Mat2<S>& p,
               std::span<const Measurement<S>> measurements, std::uint64_t usable, bool obscured,

@@ -97,6 +97,12 @@ TEST(PackedX86, EveryOperationIsItsTwinFourTimes) {
         same(dot_minus(qa, qw, sums), [&](std::size_t k) { return bits(dot_minus(a[k], w[k], sum[k])); });
         same(dot_cross_minus(qa, qw, sums),
              [&](std::size_t k) { return bits(dot_cross_minus(a[k], w[k], sum[k])); });
+        same(multiply_00(qa, b[0], sums),
+             [&](std::size_t k) { return bits(multiply_00(a[k], b[0], sum[k])); });
+        same(multiply_10(qa, b[0], sums),
+             [&](std::size_t k) { return bits(multiply_10(a[k], b[0], sum[k])); });
+        same(multiply_11(qa, b[0], sums),
+             [&](std::size_t k) { return bits(multiply_11(a[k], b[0], sum[k])); });
         const Sum4 others = dot(qa, qb, 0);
         same(pack_high(sums, others), [&](std::size_t k) { return pack_high(sum[k], dot(a[k], b[k], 0)); });
     }
